@@ -9,9 +9,12 @@ from pathlib import Path
 here = Path(__file__).parent
 sys.path.insert(0, str(here))
 
+from _laws import draw_all as draw_laws  # noqa: E402
+from _links import resolve  # noqa: E402
 from _papers import write_table  # noqa: E402
 from _pictures import draw_all  # noqa: E402
-from _reference import process_docstring, skip_member, write_pages  # noqa: E402
+from _reference import process_docstring, process_signature, skip_member, write_pages  # noqa: E402
+from sphinx.util import logging  # noqa: E402
 
 
 project = "jaxdamp"
@@ -19,17 +22,21 @@ author = "the jaxdamp developers"
 copyright = author
 version = release = installed_version("jaxdamp")
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
-myst_enable_extensions = ["colon_fence", "deflist"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton", "_formulas"]
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
+myst_update_mathjax = False
+copybutton_prompt_text = "$ "
 myst_heading_anchors = 3
-default_role = "code"  # docstrings write `name`
+default_role = "py:obj"  # docstrings write `name`: a link where it is a name of the library, else code
 
-autodoc_typehints = "none"
+autodoc_typehints = "none"  # `process_signature` writes them
+maximum_signature_line_length = 100
+add_module_names = False
 autodoc_member_order = "bysource"
 napoleon_use_ivar = True
 napoleon_use_rtype = False
 napoleon_preprocess_types = False
-toc_object_entries = False
+toc_object_entries_show_parents = "hide"
 
 html_theme = "furo"
 html_title = f"jaxdamp {release}"
@@ -43,21 +50,25 @@ def copy_notebooks(target: Path) -> list[str]:
         executed = here.parent / "build" / "notebooks" / source.name
         if executed.exists() and executed.stat().st_mtime > source.stat().st_mtime:
             source = executed
-        else:
+        elif "image/png" not in source.read_text(encoding="utf-8"):
             without_results.append(source.stem)
         shutil.copy2(source, target / source.name)
     return without_results
 
 
 nb_execution_mode = "off"
-if unexecuted := copy_notebooks(here / "notebooks"):
-    print(f"without pictures, because `pytest -m notebook` has not run since they changed: {', '.join(unexecuted)}")
+unexecuted = copy_notebooks(here / "notebooks")
 
 
 def setup(app):
-    """Write the generated sources before Sphinx looks for pages."""
+    """Write the generated sources before Sphinx looks for pages; a strict build has results in all of them."""
+    if unexecuted:
+        words = "without results, because `pytest -m notebook` has not run since they changed: %s"
+        logging.getLogger(__name__).warning(words, ", ".join(unexecuted))
     draw_all(here / "pictures")
     write_table(here / "papers.md")
-    write_pages(here / "reference")
+    write_pages(here / "reference", draw_laws(here / "pictures" / "laws"))
     app.connect("autodoc-skip-member", skip_member)
     app.connect("autodoc-process-docstring", process_docstring, priority=400)  # before napoleon
+    app.connect("autodoc-process-signature", process_signature)
+    app.connect("missing-reference", resolve)

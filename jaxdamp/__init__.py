@@ -26,7 +26,7 @@ if TYPE_CHECKING:
         tune,
         vehicles,
     )
-    from jaxdamp.configuration import Configuration, configure
+    from jaxdamp.configuration import Configuration as Configuration, configure
     from jaxdamp.rig import respond
     from jaxdamp.simulation import Response, Ride, simulate
     from jaxdamp.sweeps import sweep
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 
 
 __all__ = [
-    "Configuration",
     "Response",
     "Ride",
     "__version__",

@@ -1,10 +1,10 @@
-"""Units and sign in which numbers are shown: tables, pictures and CSV ask here; computing and JSON stay in SI.
+"""Units, sign and words in which results are shown: tables, pictures and CSV ask here; computing and JSON stay in SI.
 
 Forces, velocities and strokes have the sign of the library everywhere else: positive in extension (rebound).
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -40,8 +40,9 @@ UNITS = {
 }
 _FACTOR = re.compile(r"(lbf|kgf|kN|N|mm|in|m|kg|lb|s)(?:\^(-?[\d.]+))?")
 _KEPT = re.compile(r"m/s(\^|²|\^2)|^m\^?[23²³]|m/km|cycle")  # accelerations, areas, road roughness: SI for everybody
+_EXPONENT = re.compile(r"(?<![\w.])\d(?:\.\d+)?e\+0[1-5]\b")  # two or three digits of a large number: 1.1e+03 is 1100
 _AMOUNT = re.compile(
-    r"(?<![\w.])([-−+]?\d+(?:\.\d+)?)(?:( to | … )([-−+]?\d+(?:\.\d+)?))? (N s/m|N/mm|N/m|mm/s|m/s|mm|N)(?![\w²^/])"
+    r"(?<![\w.])([-−+]?\d+(?:\.\d+)?)(?:( to | … )([-−+]?\d+(?:\.\d+)?))? (N s/m|N/mm|N/m|mm/s|m/s|mm|kN|N)(?![\w²^/])"
 )
 _SIGNED = re.compile(
     r"(mid-stroke |stated )?(rebound |compression |mean |static |gas |least |largest )?(force|velocity|stroke)( at .*)?"
@@ -60,15 +61,10 @@ _SIGN_WORDS = re.compile("|".join(map(re.escape, _PHRASES)))
 
 
 class Shown(NamedTuple):
-    """How numbers of one unit are shown.
+    """How numbers of one unit are shown."""
 
-    Attributes:
-        unit: that is printed.
-        factor: number printed = factor · number; negative where the sign is the other one.
-    """
-
-    unit: str
-    factor: float
+    unit: str  # that is printed
+    factor: float  # number printed = factor · number; negative where the sign is the other one
 
     def __call__(self, values: Number) -> Number:
         """The numbers that are printed."""
@@ -77,13 +73,14 @@ class Shown(NamedTuple):
 
 @dataclass(frozen=True)
 class Display:
-    """Units and sign of what is shown.
+    """Units, sign and words of what is shown.
 
     Arguments:
         units: "SI" (as the library computes), "metric" (N, mm, mm/s), "imperial" (lbf, in, in/s, lb), or a force and a
             velocity such as "kgf,mm/s".
         sign: "rebound-positive" or "compression-positive": the direction in which strokes, velocities and the forces
             that resist them are positive.
+        wording: a sentence in the reader's words, such as with options of a command instead of arguments.
 
     Raises:
         ValueError: another word.
@@ -97,6 +94,7 @@ class Display:
 
     units: str = "SI"
     sign: str = REBOUND
+    wording: Callable[[str], str] = str
 
     def __post_init__(self) -> None:
         _checks.one_of("sign", self.sign, (REBOUND, COMPRESSION))
@@ -105,7 +103,7 @@ class Display:
 
     @property
     def plain(self) -> bool:
-        """Whether everything is shown as the library computes it."""
+        """Whether all numbers are shown as the library computes them."""
         return not self._system and self.sign == REBOUND
 
     @property
@@ -152,8 +150,9 @@ class Display:
         return self._turned(re.sub(r"\[([^\[\]]+)\]", lambda found: f"[{self.of(found[1]).unit}]", label))
 
     def words(self, sentence: str) -> str:
-        """A sentence with its forces, velocities and lengths in the units that are shown; names in it stay."""
-        return self._turned(_AMOUNT.sub(self._amount, sentence) if self._system else sentence)
+        """A sentence in the reader's words, with forces, velocities and lengths in the units that are shown."""
+        said = _plain(self.wording(sentence))
+        return self._turned(_AMOUNT.sub(self._amount, said) if self._system else said)
 
     def _turned(self, text: str) -> str:
         return _SIGN_WORDS.sub(lambda found: _PHRASES[found[0]], text) if self.sign == COMPRESSION else text
@@ -161,9 +160,16 @@ class Display:
     def _amount(self, found: re.Match[str]) -> str:
         shown = self.of(found[4])
         numbers = [
-            f"{shown(float(text.replace('−', '-'))):.{_figures(text)}g}" for text in (found[1], found[3]) if text
+            _plain(f"{shown(float(text.replace('−', '-'))):.{_figures(text)}g}")
+            for text in (found[1], found[3])
+            if text
         ]
         return f"{(found[2] or '').join(numbers)} {shown.unit}"
+
+
+def _plain(text: str) -> str:
+    """A text with large numbers of a few digits written out: 1100 for 1.1e+03."""
+    return _EXPONENT.sub(lambda found: f"{float(found[0]):.12g}", text)
 
 
 def _figures(text: str) -> int:

@@ -74,7 +74,7 @@ def solve(
         throw=False,
     )
     assert solution.ys is not None
-    return (jax.tree.map(forward_only, solution.ys) if forward else solution.ys), solution.result
+    return (jax.tree.map(_forward_only.bind, solution.ys) if forward else solution.ys), solution.result
 
 
 _FORWARD_ONLY = "pass no reverse derivatives (`jax.grad`) as they are. Pass `simulation.Adaptive(..., mode='reverse')`"
@@ -92,11 +92,6 @@ def _refuse_reverse(cotangent: PyTree, x: PyTree) -> PyTree:
 
 
 ad.deflinear2(_forward_only, _refuse_reverse)
-
-
-def forward_only(x: Array) -> Array:
-    """The same numbers, which refuse reverse derivatives with a sentence."""
-    return _forward_only.bind(x)
 
 
 def hermite(now: Scalar, time: Signal, values: Signal, slopes: Signal) -> tuple[Scalar, Scalar]:

@@ -17,6 +17,11 @@ LARGEST = 2**31  # bytes of a file of records
 FOLDER_SUFFIXES = frozenset(RECORD_SUFFIXES) - set(MAYBE_NOTES)  # of the files that a folder stands for
 
 
+def cache_home() -> Path:
+    """The user's folder for what can be computed anew: `~/.cache/jaxdamp`, under `XDG_CACHE_HOME` if that is set."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "jaxdamp"
+
+
 def find_files(
     paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]], suffixes: Collection[str] = (".csv",)
 ) -> tuple[Path, ...]:
@@ -41,16 +46,15 @@ def find_files(
     return tuple(files)
 
 
-def check_size(file: Path, size: int, what: str = "") -> None:
+def check_size(file: Path, size: int) -> None:
     """Refuse a file with more bytes than are read.
 
     Arguments:
         file: for the message.
         size: in bytes, as it lies on the disk or inflated.
-        what: "inflated", for packed files.
     """
     if size > LARGEST:
-        much = f"{size / 2**20:.0f} MiB {what}".rstrip()
+        much = f"{size / 2**20:.0f} MiB"
         raise ValueError(f"{file} has {much}, more than {LARGEST // 2**20} MiB that are read: cut or export it again.")
 
 

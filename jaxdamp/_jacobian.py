@@ -73,14 +73,10 @@ def value_and_jacobian(
 Split = Callable[[dict[str, Array]], tuple[Results, Results]]
 
 
-def _one_hot(like: Array, count: int, index: int) -> Array:
-    """`count` arrays of zeros, of which the one at `index` is ones."""
-    return jnp.zeros((count, *like.shape), like.dtype).at[index].set(1.0)
-
-
 def _forward(split: Split, point: dict[str, Array]) -> tuple[Results, Results, dict[str, Results]]:
     names = list(point)
-    tangents = {name: _one_hot(point[name], len(names), i) for i, name in enumerate(names)}
+    zeros = {name: jnp.zeros((len(names), *value.shape), value.dtype) for name, value in point.items()}
+    tangents = {name: zeros[name].at[i].set(1.0) for i, name in enumerate(names)}
 
     def push(tangent: dict[str, Array]) -> tuple[Results, Results, Results]:
         smooth, along, rest = jax.jvp(split, (point,), (tangent,), has_aux=True)

@@ -41,14 +41,6 @@ def largest(numbers: Numbers, axis: int = 0) -> Numbers:
     return jnp.take_along_axis(numbers, first, axis).squeeze(axis)
 
 
-def _slope_of_least(primals: tuple[Numbers, Numbers], tangents: tuple[Numbers, Numbers]) -> tuple[Numbers, Numbers]:
-    return _selected(primals, jnp.subtract(*primals), tangents)
-
-
-def _slope_of_most(primals: tuple[Numbers, Numbers], tangents: tuple[Numbers, Numbers]) -> tuple[Numbers, Numbers]:
-    return _selected(primals, jnp.subtract(*reversed(primals)), tangents)
-
-
 def _selected(
     values: tuple[Numbers, Numbers], lead: Numbers, changes: tuple[Numbers, Numbers]
 ) -> tuple[Numbers, Numbers]:
@@ -60,8 +52,8 @@ def _selected(
     return ans, sum((part * change for part, change in parts if type(change) is not SymbolicZero), jnp.zeros_like(ans))
 
 
-at_least.defjvp(_slope_of_least, symbolic_zeros=True)
-at_most.defjvp(_slope_of_most, symbolic_zeros=True)
+at_least.defjvp(lambda values, changes: _selected(values, values[0] - values[1], changes), symbolic_zeros=True)
+at_most.defjvp(lambda values, changes: _selected(values, values[1] - values[0], changes), symbolic_zeros=True)
 
 
 def root(power: Numbers, order: int = 2) -> Numbers:

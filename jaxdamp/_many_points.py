@@ -36,8 +36,8 @@ def outside_domains(tree: PyTree, columns: Columns) -> np.ndarray:
     by_path = {path: column for path, column in named.items() if known[path].value.ndim == 0}
     reasons = np.full(len(next(iter(named.values()))), "", dtype=object)
     for path, column in by_path.items():
-        p = known[path]
-        if not _varying_domain(tree, path):
+        p, (owner, _, name) = known[path], path.rpartition(".")
+        if name not in _domains_by_value(get(tree, owner)):  # which follows from the other values of its module
             unit = f" [{p.unit}]" if p.unit else ""
             reasons[(reasons == "") & ~_inside(p.domain, column)] = f"{path} must be {p.domain.name}{unit}"
     for prefix in dict.fromkeys(above for path in by_path for above in _above(path)):
@@ -59,12 +59,6 @@ def _above(path: str) -> list[str]:
     """The modules that a parameter lies in, the outermost, with an empty path, first."""
     parts = path.split(".")
     return [".".join(parts[:count]) for count in range(len(parts))]
-
-
-def _varying_domain(tree: PyTree, path: str) -> bool:
-    """Whether a domain follows from the other values of its module."""
-    owner, _, name = path.rpartition(".")
-    return name in _domains_by_value(get(tree, owner))
 
 
 def _domains_by_value(module: PyTree) -> dict[str, Any]:

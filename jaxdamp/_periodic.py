@@ -28,17 +28,11 @@ Period: TypeAlias = Callable[[State, Setting], tuple[State, State]]  # P(s), and
 
 
 class Shot(NamedTuple):
-    """A period from a state.
+    """A period from a state."""
 
-    Attributes:
-        after: P(s).
-        monodromy: J = ∂P/∂s.
-        change: the largest |P(s) − s| relative to the scale.
-    """
-
-    after: State
-    monodromy: Float[Array, "state state"]
-    change: Scalar
+    after: State  # P(s)
+    monodromy: Float[Array, "state state"]  # J = ∂P/∂s
+    change: Scalar  # the largest |P(s) − s| relative to the scale
 
 
 class _Search(NamedTuple):

@@ -31,12 +31,29 @@ def uniform(seed: int | Array, shape: tuple[int, ...], high: float = 1.0) -> Flo
     Raises:
         ValueError: a seed that is neither.
     """
-    return high * _fraction(*_bits(seed, shape))
+    return _fraction(*_bits(seed, shape), high)
 
 
 def normal(seed: int | Array, shape: tuple[int, ...]) -> Float[Array, "..."]:
     """Numbers of the standard normal distribution; arguments as those of `uniform`."""
-    upper, lower = _bits(seed, shape)
+    return _normal(*_bits(seed, shape))
+
+
+def normal_at(seed: int | Array, stream: int, places: UInt32[Array, "..."]) -> Float[Array, "..."]:
+    """Numbers of the standard normal distribution by their place in a stream, so that a part can be drawn alone.
+
+    Arguments:
+        seed: as in `uniform`.
+        stream: number of one of several independent sequences.
+        places: in the sequence.
+    """
+    pairs = jnp.concatenate([jnp.full(places.size, stream, jnp.uint32), places.ravel()])
+    drawn = threefry_2x32(_words(seed), pairs)
+    return _normal(*(half.reshape(places.shape) for half in jnp.split(drawn, 2)))
+
+
+@jax.jit
+def _normal(upper: UInt32[Array, "..."], lower: UInt32[Array, "..."]) -> Float[Array, "..."]:
     if jnp.asarray(0.0, float).dtype == jnp.float64:
         least = np.nextafter(-1.0, 0.0)
         return math.sqrt(2.0) * jax.lax.erf_inv(jnp.maximum(2.0 * _fraction(upper, lower) + least, least))
@@ -49,6 +66,7 @@ def normal(seed: int | Array, shape: tuple[int, ...]) -> Float[Array, "..."]:
     return jnp.where(negative, -size, size)
 
 
+@jax.jit
 def rayleigh(above: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
     """Sizes r of mean square 1 with the Rayleigh distribution, from the probability exp(-r^2) of a larger one.
 
@@ -62,17 +80,22 @@ def sign(seed: int | Array, shape: tuple[int, ...]) -> Float[Array, "..."]:
     return jnp.where(_bits(seed, shape)[0] >> 31 == 0, 1.0, -1.0).astype(float)
 
 
-def _fraction(upper: UInt32[Array, "..."], lower: UInt32[Array, "..."]) -> Float[Array, "..."]:
-    """The first 52 of 64 bits as a number from 0 to 1."""
-    return upper.astype(float) * 2.0**-32 + (lower >> 12).astype(float) * 2.0**-52
+@jax.jit
+def _fraction(upper: UInt32[Array, "..."], lower: UInt32[Array, "..."], high: float = 1.0) -> Float[Array, "..."]:
+    """The first 52 of 64 bits as a number from 0 to `high`."""
+    return high * (upper.astype(float) * 2.0**-32 + (lower >> 12).astype(float) * 2.0**-52)
 
 
 def _bits(seed: int | Array, shape: tuple[int, ...]) -> tuple[UInt32[Array, "..."], UInt32[Array, "..."]]:
     """64 random bits for each number, as the upper and the lower half."""
-    size = math.prod(shape)
-    place = np.arange(size, dtype=np.uint32)
-    drawn = threefry_2x32(_words(seed), jnp.asarray(np.concatenate([np.zeros_like(place), place])))
-    return drawn[:size].reshape(shape), drawn[size:].reshape(shape)
+    return _halves(_words(seed), shape)
+
+
+@jax.jit(static_argnames="shape")
+def _halves(words: UInt32[Array, "2"], shape: tuple[int, ...]) -> tuple[UInt32[Array, "..."], UInt32[Array, "..."]]:
+    place = jnp.arange(math.prod(shape), dtype=jnp.uint32)
+    upper, lower = jnp.split(threefry_2x32(words, jnp.concatenate([jnp.zeros_like(place), place])), 2)
+    return upper.reshape(shape), lower.reshape(shape)
 
 
 def _words(seed: int | Array) -> UInt32[Array, "2"]:
@@ -89,7 +112,8 @@ def _words(seed: int | Array) -> UInt32[Array, "2"]:
         _checks.refuse("seed", "be a whole number or a JAX random key", repr(seed), "Pass `seed=1`.")
     if known is not None:
         number = int(known)
-        return jnp.asarray(np.array([number >> 32 & _MASK, number & _MASK], dtype=np.uint32))
+        # with its type named, JAX takes an array over as it is, without a program
+        return jnp.asarray(np.array([number >> 32 & _MASK, number & _MASK], dtype=np.uint32), np.uint32)
     traced = jnp.asarray(seed)
     if traced.dtype.itemsize == 8:
         upper = (traced >> 32).astype(jnp.uint32)

@@ -96,6 +96,18 @@ def increasing_root(
     return jax.lax.custom_root(function, jax.lax.stop_gradient(guess), solve, tangent_solve)
 
 
+Pair = tuple[Scalar, Scalar]
+
+
+def newton_of_two(function: Callable[[Pair], Pair], at: Pair) -> Pair:
+    """Where Newton's method for two functions of two numbers goes from there."""
+    one, zero = jnp.ones_like(at[0]), jnp.zeros_like(at[0])
+    (f, g), (f_a, g_a) = jax.jvp(function, (at,), ((one, zero),))
+    _, (f_b, g_b) = jax.jvp(function, (at,), ((zero, one),))
+    per_determinant = 1.0 / (f_a * g_b - f_b * g_a)
+    return at[0] + (f_b * g - g_b * f) * per_determinant, at[1] + (g_a * f - f_a * g) * per_determinant
+
+
 @final
 class ImplicitDerivatives(optx.AbstractAdjoint):
     """`optimistix.ImplicitAdjoint` for a few unknowns in one array, of vehicles that run side by side.

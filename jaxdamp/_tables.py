@@ -13,6 +13,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._display import Display, display
+from jaxdamp._words import path_words, said, typeset
 
 
 Cell = str | float | int | None
@@ -61,7 +62,7 @@ class Column(NamedTuple):
         """A cell for reading; nothing where there is no value."""
         if cell is None:
             return ""
-        return cell if isinstance(cell, str) else format(cell, self.spec)
+        return display().words(cell) if isinstance(cell, str) else format(cell, self.spec)
 
 
 @dataclass(frozen=True, repr=False)
@@ -159,20 +160,37 @@ class Table:
         writer.writerows([_plain_cell(cell) for cell in row] for row in self.shown().rows)
         return out.getvalue()
 
-    def to_html(self) -> str:
-        """The rows for reading, as HTML."""
+    def to_html(self, *, words: bool = False) -> str:
+        """The rows for reading, as HTML.
+
+        Arguments:
+            words: metrics, laws and parameters as people say them, with their names in the library where a mouse rests.
+        """
         sides = [' class="number"' if self.is_number(i) else "" for i in range(len(self.columns))]
         cells = zip(self.headings(), sides, strict=True)
-        head = "".join(f'<th scope="col"{side}>{html.escape(heading)}</th>' for heading, side in cells)
-        lines = [
-            "<tr>" + "".join(f"<td{s}>{html.escape(text)}</td>" for text, s in zip(row, sides, strict=True)) + "</tr>"
-            for row in self.texts()
-        ]
+        head = "".join(
+            f'<th scope="col"{side}>{html.escape(said(heading) if words else heading)}</th>' for heading, side in cells
+        )
+        named = [words and column.name in _NAMES for column in self.columns]
+        lines = []
+        for row in self.texts():
+            parts = [_html_cell(*part, words=words) for part in zip(row, sides, named, strict=True)]
+            lines.append(f"<tr>{''.join(parts)}</tr>")
         caption = f"<caption>{html.escape(display().text(self.title))}</caption>"
         return "\n".join([f"<table>{caption}", f"<thead><tr>{head}</tr></thead><tbody>", *lines, "</tbody></table>"])
 
     _repr_html_ = to_html
     __repr__ = to_text
+
+
+_NAMES = ("law", "metric", "parameter", "what")  # columns with names of the library
+
+
+def _html_cell(text: str, side: str, named: bool, *, words: bool) -> str:
+    """A cell as HTML."""
+    said = path_words(text) if named else typeset(text) if words else text
+    title = f' title="{html.escape(text)}"' if said != text and named else ""
+    return f"<td{side}{title}>{html.escape(said)}</td>"
 
 
 _COUNTS = ("count", "cycles", "wheels", "ratio", "times", "(value − true)/se")  # columns whose numbers have no unit
@@ -183,8 +201,6 @@ def _cell_shown(present: Display, column: Column, cell: Cell, unit: str, quantit
     """A cell in the units and the sign that are shown, of a row with this unit and quantity, if it states them."""
     if column.name == "unit":
         return _unit_shown(present, str(cell))
-    if isinstance(cell, str):
-        return present.words(cell)
     own = column.unit or ("" if column.name in _COUNTS else unit)
     if not isinstance(cell, float) or own in ("", "–", "%"):
         return cell
@@ -283,9 +299,10 @@ def with_tied(note: str, tied: Sequence[str]) -> str:
 
 def _plain_cell(cell: object) -> object:
     """A cell of a CSV file; texts that a spreadsheet would compute as a formula begin with an apostrophe."""
-    if cell is None:
-        return ""
-    return f"'{cell}" if isinstance(cell, str) and cell.startswith(("=", "+", "-", "@", "\t", "\r")) else cell
+    if not isinstance(cell, str):
+        return "" if cell is None else cell
+    said = display().words(cell)
+    return f"'{said}" if said.startswith(("=", "+", "-", "@", "\t", "\r")) else said
 
 
 def rounded(value: float, error: float) -> tuple[str, str]:

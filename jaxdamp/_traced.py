@@ -21,6 +21,8 @@ from jax.extend.core import (
 )
 from jaxtyping import PyTree
 
+from jaxdamp._forked import refuse_fork
+
 
 Tree = TypeVar("Tree")
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -122,6 +124,7 @@ def of_known_numbers(function: Function) -> Function:
 
     @functools.wraps(function)
     def call(*args: object, **kwargs: Any) -> Any:
+        refuse_fork()
         if is_traced((args, kwargs)):
             from jaxdamp import _checks
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import jax
 
 from jaxdamp import _checks
+from jaxdamp._files import cache_home
 from jaxdamp.codegen import is_printing
 
 
@@ -180,5 +181,4 @@ def _folder(cache: bool | str | Path) -> Path | None:
         return None
     if cache is not True:
         return Path(cache).expanduser()
-    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(home) / "jaxdamp"
+    return cache_home()

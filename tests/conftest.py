@@ -28,18 +28,10 @@ MOST_KEPT = 2_000_000_000  # bytes of compiled programs in .pytest_cache
 MOST_PROGRAMS = 200
 MORE_PROGRAMS = {
     "test_contract": 375,
-    "test_c": 450,
-    "test_the_residual_of_a_problem_gives_the_truth_within_bounds_where_a_start_at_rest_does_not": 300,
-    "test_the_slopes_of_the_pressure_drop_are_those_of_its_formula": 270,
     "test_steps_are_divided_alike_however_a_number_is_traced": 270,
     "test_what_is_no_argument_of_a_compiled_function_is_known_inside": 240,
-    "test_derivatives_by_parameters_and_speed_agree_with_differences": 240,
-    "test_a_spring_beside_is_a_stiffer_spring_wherever_it_stands": 240,
     "test_hysteresis_is_told_from_a_delay_by_several_records": 210,
     "test_a_vehicle_of_parts_and_one_with_everything_come_back": 210,
-    "test_a_delay_of_half_a_sample_is_exact_where_friction_turns_within_one": 210,
-    "test_derivatives_where_lag_and_delay_are_zero": 210,
-    "test_derivatives_are_finite_where_an_effect_starts_at_zero": 210,
     "test_the_use_of_a_damper_is_shaded": 210,
     "test_a_test_of_many_small_programs_fails": 3,
 }
@@ -58,24 +50,37 @@ def pytest_configure(config: pytest.Config) -> None:
         return
     kept = config.cache.mkdir("programs")
     main = not hasattr(config, "workerinput")  # it begins before its workers do
-    if main and sum(file.stat().st_size for file in kept.iterdir()) > MOST_KEPT:
+    if main and sum(file.stat().st_size for file in kept.rglob("*")) > MOST_KEPT:
         shutil.rmtree(kept)
         kept.mkdir()
     # JAX does not write these files in one step: each process has a folder of links and hands in what it adds.
     ours = Path(tempfile.mkdtemp(dir=kept.parent))
-    for file in kept.iterdir():
-        os.link(file, ours / file.name)
+    _link(kept, ours)
     jax.config.update("jax_compilation_cache_dir", str(ours))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
     jax.config.update("jax_persistent_cache_enable_xla_caches", "none")  # their path would be part of every key
+    config.stash[FOLDERS] = ours, kept
     config.add_cleanup(lambda: _hand_in(ours, kept))
 
 
+FOLDERS = pytest.StashKey[tuple[Path, Path]]()
+PRINTED = "printed"  # inside: where `jaxdamp.codegen` keeps functions printed as C
+
+
+def _link(source: Path, target: Path) -> None:
+    """Have the files of a folder of programs in another one too."""
+    for part in (".", PRINTED):
+        here, there = source / part, target / part
+        if here.is_dir():
+            there.mkdir(mode=0o700, exist_ok=True)
+            for name in {*os.listdir(here)}.difference(os.listdir(there), [PRINTED]):
+                with contextlib.suppress(FileExistsError):
+                    os.link(here / name, there / name)
+
+
 def _hand_in(ours: Path, kept: Path) -> None:
-    for file in ours.iterdir():
-        with contextlib.suppress(FileExistsError):
-            os.link(file, kept / file.name)
+    _link(ours, kept)
     shutil.rmtree(ours)
 
 
@@ -124,9 +129,17 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, Any, Any]
 
 
 @pytest.fixture(scope="module", autouse=True)
-def few_programs() -> Iterator[None]:
-    """Forget compiled programs before there are so many that the next one crashes the process."""
+def few_programs(pytestconfig: pytest.Config) -> Iterator[None]:
+    """Take what other workers have compiled, and give them what the module has.
+
+    Programs are forgotten before there are so many that the next one crashes the process.
+    """
+    ours, kept = pytestconfig.stash.get(FOLDERS, (None, None))
+    if ours and kept:
+        _link(kept, ours)
     yield
+    if ours and kept:
+        _link(ours, kept)
     if MAPS.exists() and MAPS.read_bytes().count(b"\n") > MOST_MAPS:
         jax.clear_caches()
         gc.collect()

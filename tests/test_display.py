@@ -57,6 +57,14 @@ def test_sentences_have_the_unit_and_names_in_them_stay():
     assert SHOP.words(text) == "RMSE 10 lbf at -10 to 20 in/s of '20 mm_a', from 'F [N]', 3 m/s^2"
 
 
+def test_large_numbers_in_sentences_are_written_out():
+    said = "like a spring of 1.1e+03 N/m, a jump of +2e+03 N"
+    assert Display().words(said) == "like a spring of 1100 N/m, a jump of +2000 N"
+    assert Display("imperial").words(said) == "like a spring of 6.281 lbf/in, a jump of 449.6 lbf"
+    assert Display("imperial").words("rear -4.45 kN of 2.67 kN") == "rear -1000 lbf of 600 lbf"
+    assert Display().words("between 1e-05 and 2.5e+07") == "between 1e-05 and 2.5e+07"
+
+
 def test_a_picture_has_ticks_in_the_unit_and_runs_the_other_way():
     figure = _style.new_figure(4, 3)
     axes = figure.subplots()

@@ -4,7 +4,7 @@ from importlib import import_module
 
 import pytest
 
-from jaxdamp import _guesses, dampers
+from jaxdamp import Response, _guesses, dampers
 
 
 @pytest.mark.parametrize(
@@ -34,4 +34,6 @@ def test_what_is_answered_is_there_and_what_is_asked_is_not() -> None:
 def test_a_table_from_a_file(tmp_path) -> None:
     with pytest.raises(AttributeError, match=r"did you mean `jaxdamp.bench.read_table\(path\).law\(\)`"):
         _ = dampers.Table.from_csv
+    with pytest.raises(AttributeError, match=r"velocity_histogram\(response"):
+        _ = Response.histogram
     assert not hasattr(dampers.Table([-1.0, 1.0], [-1.0, 1.0]), "from_csv")

@@ -92,6 +92,7 @@ def _vehicle_results() -> list[AbstractResult]:
     heights = 0.01 * np.random.default_rng(1).standard_normal(2000)
     return [
         identify.fit_vehicle(car, record, over=["damper.rate"], dt=5e-3),
+        identify.compare({"alone": car}, record, over=["damper.rate"], dt=5e-3),
         vehicles.modes(car),
         jaxdamp.simulate(car, road, dt=5e-3),
         jaxdamp.simulation.harmonic_response(car, [1.0, 2.0], 0.01, substeps=4),

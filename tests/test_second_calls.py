@@ -12,6 +12,7 @@ from jaxdamp.bench import BenchSet, SineTest
 from jaxdamp.dampers import Bilinear, BoucWen, Lag, Linear, Spring
 from jaxdamp.rig import Rig
 from jaxdamp.simulation import Adaptive, Exponential
+from jaxdamp.vehicles import frequency_response, spectral_rms
 from jaxdamp.vehicles.presets import half_car_002, quarter_car_000
 
 
@@ -79,6 +80,25 @@ CALLS = {
 def test_of_a_law_with_other_numbers(name):
     first, *others = in_calls(CALLS[name], [1500.0, 1700.0, 1900.0])
     assert first > 0 and others == [0, 0]
+
+
+OF_A_LENGTH = {
+    "respond": (2, lambda count: respond(Bilinear(1500.0, 900.0), 1e-3 * np.arange(count), np.zeros(count))),
+    "frequency response": (1, lambda count: frequency_response(half_car_002(), np.arange(float(count)), speed=20.0)),
+    "spectral RMS": (
+        1,
+        lambda count: spectral_rms(half_car_002(), np.arange(float(count)), np.ones(count), speed=20.0),
+    ),
+    "road of waves": (3, lambda count: roads.iso8608("C", 20.0, seed=1, length=100.0 * count).phase),
+    "filtered road": (4, lambda count: roads.iso8608_filtered("C", 20.0, seed=1, length=1.0 * count).samples),
+}
+
+
+@pytest.mark.parametrize("name", OF_A_LENGTH)
+def test_of_another_length_compiles_few_programs(name):
+    most, call = OF_A_LENGTH[name]
+    _, other = in_calls(call, [31, 37])
+    assert 0 < other <= most
 
 
 STARTS: dict[str, dict[str, Any]] = {"alone": {}, "on a machine": {"rig": Rig(gas_force=-50.0, force_delay=1e-3)}}

@@ -94,6 +94,33 @@ def exponential(
     return _run(f"{case}_exponential", case, parameters, road, dt, _matrices(case, dt), threads, lanes)
 
 
+def skyhook(
+    parameters: Parameters,
+    road: Heights,
+    dt: float = 1e-3,
+    *,
+    every: int = 5,
+    lag: float,
+    still: float = 0.1,
+    threads: int = 1,
+    lanes: int = 32,
+) -> Results:
+    """RMS acceleration of the body under linear skyhook by the exponential step.
+
+    Arguments:
+        parameters: soft and hard rate of the damper and gain of skyhook of each car [N s/m].
+        road: heights [m].
+        dt: step [s].
+        every: steps of a period.
+        lag: of the actuator [s].
+        still: velocity below which force over velocity is rounded [m/s].
+        threads: number of threads.
+        lanes: cars in a block.
+    """
+    extra = np.append(_matrices("skyhook", dt), [every, lag, still])
+    return _run("skyhook_exponential", "skyhook", parameters, road, dt, extra, threads, lanes)
+
+
 def _run(
     name: str,
     case: str,
@@ -106,9 +133,9 @@ def _run(
 ) -> Results:
     """Call a kernel."""
     table, heights = (np.ascontiguousarray(a, dtype=np.float64) for a in (parameters, road))
-    wheels = 2 if case == "half_car" else 1
-    if table.shape[1] != len(problem.names(case)) or heights.shape[1] != wheels:
-        raise ValueError(f"{case} needs {len(problem.names(case))} parameters and {wheels} track(s).")
+    wheels, columns = 2 if case == "half_car" else 1, 3 if case == "skyhook" else len(problem.names(case))
+    if table.shape[1] != columns or heights.shape[1] != wheels:
+        raise ValueError(f"{case} needs {columns} parameters and {wheels} track(s).")
     kernel = library(lanes)[name]
     kernel.restype = None
     kind = ctypes.c_int if isinstance(extra, ctypes.c_int) else _ARRAY

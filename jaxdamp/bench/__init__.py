@@ -16,6 +16,7 @@ from jaxdamp.bench.analysis import (
     peak_velocity_points,
     steady_cycles as steady_cycles,
 )
+from jaxdamp.bench.command_steps import CommandStep
 from jaxdamp.bench.contradictions import (
     Contradiction as Contradiction,
     contradictions,
@@ -35,25 +36,28 @@ from jaxdamp.bench.evaluation import (
 )
 from jaxdamp.bench.force_velocity import ForceVelocityTable as ForceVelocityTable, are_tables as are_tables, read_table
 from jaxdamp.bench.kinematics import Kinematics as Kinematics, read_kinematics
+from jaxdamp.bench.motion import white_noise as white_noise
 from jaxdamp.bench.preflight import (
     Finding as Finding,
     Preflight as Preflight,
     clock_jitter as clock_jitter,
     mains_lines as mains_lines,
     preflight,
-    usable,
+    usable as usable,
 )
 from jaxdamp.bench.processing import Steps, low_pass_gain
-from jaxdamp.bench.programmes import Excitation, RandomTest, SineTest
+from jaxdamp.bench.programmes import Excitation as Excitation, RandomTest, SineTest
 from jaxdamp.bench.raw import RawColumn, RawTable
 from jaxdamp.bench.read import read, read_rides
 from jaxdamp.bench.readers import READERS
 from jaxdamp.bench.ride_record import RideRecord
 from jaxdamp.bench.runs import BenchRun
+from jaxdamp.bench.sensors import Sensors
 from jaxdamp.bench.sets import BenchSet, as_runs as as_runs
 from jaxdamp.bench.settings import by_number as by_number, settings_apart as settings_apart
+from jaxdamp.bench.units import ratio as ratio
 from jaxdamp.bench.velocity import estimate_velocity
-from jaxdamp.bench.virtual_dyno import Sensors, VirtualDyno
+from jaxdamp.bench.virtual_dyno import VirtualDyno
 from jaxdamp.bench.waveforms import MultiSineTest, TriangleTest
 
 
@@ -61,7 +65,7 @@ __all__ = [
     "READERS",
     "BenchRun",
     "BenchSet",
-    "Excitation",
+    "CommandStep",
     "Limit",
     "MultiSineTest",
     "RandomTest",
@@ -87,7 +91,6 @@ __all__ = [
     "read_rides",
     "read_table",
     "separate_gas_and_friction",
-    "usable",
 ]
 
 answer_guesses(__name__, __all__)

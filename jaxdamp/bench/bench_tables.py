@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -104,17 +105,20 @@ def _values(table: RawTable, raw: RawColumn, column: Column) -> tuple[Samples, s
     """One channel in SI, and a note on time stamps."""
     where = f"{table.where}, column {column.header!r}"
     values = np.asarray(raw.values)
+    drop = Setting("drop_bad_rows", True)
     if raw.faults:
         row, text = min(raw.faults.items())
         what = f"{text!r} is not a number" if text else "the value is missing"
         more = f" ({len(raw.faults)} such values in all)" if len(raw.faults) > 1 else ""
-        raise ValueError(
-            f"{table.where}, {table.place(row)}, column {column.header!r}: {what}{more}. Mend or remove the line."
-        )
+        place = f"{table.where}, {table.place(row)}, column {column.header!r}"
+        raise ArgumentError(f"{place}: {what}{more}. Mend or remove the line, or pass {drop}.", drop)
     if column.conversion is None:
         return stamps.seconds(values, where, table.place)
     values = column.conversion(np.ascontiguousarray(values))
-    clock.check_numbers(values, f"{column.role} (column {column.header!r})", table.where, table.lines)
+    try:
+        clock.check_numbers(values, f"{column.role} (column {column.header!r})", table.where, table.lines)
+    except ValueError as error:
+        raise ArgumentError(f"{error} Or pass {drop}.", drop) from error
     return values, ""
 
 
@@ -204,6 +208,7 @@ def _record(
         velocity, source = _velocity(time, stroke, velocity, where)
     temperature = channels.get("temperature")
     stated = _stated(table) if states_all else {}
+    commanded = _commanded(columns, channels, part, stated.get("command"))
     return BenchRun(
         name,
         time,
@@ -211,12 +216,43 @@ def _record(
         _turned(velocity, decision.motion),
         _turned(force, decision.force),
         temperature=None if temperature is None else part.of(temperature),
-        command=stated.get("command"),
+        command=commanded.held,
+        command_channel=commanded.channel,
+        command_unit=commanded.unit,
         settings=stated.get("settings", {}),
         source=str(table.file),
-        notes=(*stated.get("notes", ()), *notes, *part.notes, *decision.notes, source or "velocity as the file states"),
+        notes=(
+            *stated.get("notes", ()),
+            *notes,
+            *part.notes,
+            *commanded.notes,
+            *decision.notes,
+            source or "velocity as the file states",
+        ),
         stroke_is_integrated=integrated or stated.get("stroke_is_integrated", False),
     )
+
+
+class _Commanded(NamedTuple):
+    """The command of a record: held, or a channel with its unit; and a note where a column shows that it is held."""
+
+    held: float | None
+    channel: Samples | None = None
+    unit: str = ""
+    notes: tuple[str, ...] = ()
+
+
+def _commanded(
+    columns: Mapping[str, Column], channels: Mapping[str, Samples], part: Part, stated: float | None
+) -> _Commanded:
+    """The command of a record, by its column if it has one."""
+    conversion = columns["command"].conversion if "command" in channels else None
+    if conversion is None:
+        return _Commanded(stated)
+    values = part.of(channels["command"])
+    if np.ptp(values) > 0.0:
+        return _Commanded(None, values, conversion.si)
+    return _Commanded(float(values[0]), notes=(f"command held at {values[0]:g} {conversion.si}, by its column",))
 
 
 def _refuse_signs(how: Interpretation, where: str) -> None:

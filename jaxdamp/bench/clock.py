@@ -164,21 +164,13 @@ _MOST_PARTS = 20
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A stretch of a record without gap.
+    """A stretch of a record without gap."""
 
-    Arguments:
-        samples: which samples of the file it holds.
-        stored: their instants in the file [s].
-        time: uniform instants [s].
-        resample: whether the channels have to be interpolated at these instants.
-        notes: what was done to the time.
-    """
-
-    samples: slice
-    stored: Samples
-    time: Samples
-    resample: bool
-    notes: tuple[str, ...]
+    samples: slice  # which samples of the file it holds
+    stored: Samples  # their instants in the file [s]
+    time: Samples  # uniform instants [s]
+    resample: bool  # whether the channels have to be interpolated at these instants
+    notes: tuple[str, ...]  # what was done to the time
 
     def of(self, values: Float[np.ndarray, " file_time"]) -> Samples:
         """A channel of the file at the instants of this part."""

@@ -1,6 +1,5 @@
 """Which column of a table is which quantity, and in which unit."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NoReturn
@@ -9,35 +8,14 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
+from jaxdamp.bench.headers import NOT_MEASURED, ROLES, role_of, signal_unit, split_header, tail_unit, words_in
 from jaxdamp.bench.problems import Problems
 from jaxdamp.bench.raw import RawColumn, RawTable
 from jaxdamp.bench.stamps import is_stamp
-from jaxdamp.bench.units import SI, USUAL, Conversion, conversion, gain_conversion, named_conversion, ratio
+from jaxdamp.bench.units import USUAL, Conversion, conversion, gain_conversion, named_conversion, ratio
 
 
-ROLES = tuple(SI)
 REQUIRED = ("stroke", "force")
-_WORDS = {
-    "time": ("time", "zeit", "elapsed", "clock", "timestamp", "datetime", "uhrzeit", "epoch", "t"),
-    "stroke": (
-        "stroke",
-        "displacement",
-        "disp",
-        "position",
-        "pos",
-        "travel",
-        "weg",
-        "hub",
-        "lvdt",
-        "extension",
-        "x",
-        "s",
-    ),
-    "velocity": ("velocity", "vel", "geschwindigkeit", "xdot", "speed", "v"),
-    "force": ("force", "load", "kraft", "frc", "loadcell", "f"),
-    "temperature": ("temperature", "temp", "temperatur", "thermocouple", "t"),
-}
-_NOT_MEASURED = {"setpoint", "command", "cmd", "demand", "target", "soll", "reference", "ref", "error"}
 
 
 @dataclass(frozen=True)
@@ -56,57 +34,6 @@ class Column:
     def unit(self) -> str:
         """The unit of the file."""
         return "time stamps" if self.conversion is None else self.conversion.unit
-
-
-def split_header(header: str) -> tuple[str, str | None]:
-    """Name and unit in a header that sets the unit apart: in brackets, behind a comma or behind a slash.
-
-    >>> split_header("Displacement, in"), split_header("force [N]"), split_header("v/(m/s)"), split_header("x_mm")
-    (('Displacement', 'in'), ('force', 'N'), ('v', 'm/s'), ('x_mm', None))
-    """
-    bracket = re.fullmatch(r"(.*?)\s*/?\s*[\[({<]\s*([^\[\](){}<>]*?)\s*[\])}>]", header)
-    if bracket:
-        return bracket[1].strip(), bracket[2] or None
-    for mark in (r"\s*,\s*", r"\s+/\s+", r"/"):
-        parts = re.split(mark, header, maxsplit=1)
-        if len(parts) == 2 and all(parts) and not (mark == "/" and re.search(r"[_\s]", parts[0])):
-            return parts[0].strip(), parts[1].strip()
-    return header.strip(), None
-
-
-def _tail_unit(name: str, role: str) -> tuple[str, Conversion] | None:
-    """The unit behind an underscore or a space, the longest that is one: "v_mm_s" is mm/s."""
-    pieces = re.split(r"[_\s]+", name)
-    for start in range(1, len(pieces)):
-        unit = conversion(role, "_".join(pieces[start:]))
-        if unit is not None:
-            return "_".join(pieces[:start]), unit
-    return None
-
-
-def _words(name: str) -> list[str]:
-    apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
-    return [word.lower() for word in re.split(r"[^A-Za-zÀ-ÿ]+", apart) if word]
-
-
-def role_of(header: str, unit: str = "") -> str | None:
-    """The quantity that a header names; its unit decides between several ("T_degC" is no time).
-
-    Whole words count more than single letters, and the last word more than those before it, as in "load cell
-    temperature". Columns of set points are none.
-    """
-    name, written = split_header(header)
-    written = unit or written
-    signal = _signal(name)
-    words = _words(name.removesuffix(signal))
-    if _NOT_MEASURED.intersection(words):
-        return None
-    by_words = [role for word in reversed(words) for role in ROLES if len(word) > 1 and word in _WORDS[role]]
-    by_letter = [role for role in ROLES if words and words[0] in _WORDS[role] and len(words[0]) == 1]
-    for role in by_words + by_letter:
-        if (conversion(role, written) if written else _tail_unit(name, role)) is not None:
-            return role
-    return next(iter(by_words + (by_letter if len(words) <= 2 else [])), None)
 
 
 @dataclass(frozen=True)
@@ -138,10 +65,10 @@ class Choice:
 
 
 def find_columns(table: RawTable, choice: Choice) -> tuple[dict[str, Column], tuple[str, ...]]:
-    """Assign the columns of a table to time, stroke, velocity, force and temperature.
+    """Assign the columns of a table to time, stroke, velocity, force, temperature and command.
 
-    A quantity that a record can do without, velocity or temperature, is left out where its column is doubtful, and a
-    note says so, unless the caller asked for it.
+    A quantity that a record can do without, velocity, temperature or command, is left out where its column is
+    doubtful, and a note says so, unless the caller asked for it.
 
     Arguments:
         table: the table read from a file.
@@ -276,7 +203,7 @@ def _fits(column: RawColumn, role: str, choice: Choice) -> bool:
         return unit is None or conversion(role, unit) is None
     if column.is_text:
         return False
-    return (conversion(role, unit) if unit else _tail_unit(name, role)) is not None
+    return (conversion(role, unit) if unit else tail_unit(name, role)) is not None
 
 
 def _is_clock(column: RawColumn) -> bool:
@@ -294,10 +221,10 @@ def column_of(table: RawTable, role: str, index: int, choice: Choice) -> Column:
             return Column(role, index, header, None)
         raise ArgumentError(f"{where} ({role}) holds text ({np.asarray(column.values)[0]!r}), not numbers.")
     name, written = split_header(column.name)
-    tail = None if column.unit or written else _tail_unit(name, role)
+    tail = None if column.unit or written else tail_unit(name, role)
     stated = column.unit or written or ""
     if role in choice.gains:
-        unit = choice.units.get(role) or stated or _signal(name)
+        unit = choice.units.get(role) or stated or signal_unit(name)
         return Column(role, index, header, gain_conversion(role, choice.gains[role], unit, where))
     if role in choice.units:
         return Column(role, index, header, named_conversion(role, choice.units[role], where))
@@ -305,7 +232,7 @@ def column_of(table: RawTable, role: str, index: int, choice: Choice) -> Column:
         return Column(role, index, header, named_conversion(role, stated, where))
     if tail:
         return Column(role, index, header, tail[1])
-    signal = _signal(name)
+    signal = signal_unit(name)
     if signal:
         named_conversion(role, signal, where)  # refuses it, with the gain as the remedy
     example = Setting("units", {role: USUAL[role][0]})
@@ -314,12 +241,6 @@ def column_of(table: RawTable, role: str, index: int, choice: Choice) -> Column:
         f'header: "{name} [{USUAL[role][0]}]".',
         example,
     )
-
-
-def _signal(name: str) -> str:
-    """The unit of a sensor's signal behind an underscore or a space, as in "F_mV"; empty if there is none."""
-    tail = re.split(r"[_\s]+", name)[-1] if re.search(r"[_\s]", name) else ""
-    return tail if tail and ratio(tail, "V") is not None else ""
 
 
 def _refuse_missing(table: RawTable, role: str, columns: Mapping[str, Column | None]) -> NoReturn:
@@ -347,4 +268,4 @@ def _is_other(column: RawColumn, role: str) -> bool:
     said = role_of(column.name, column.unit)
     unit = column.unit or written or ""
     foreign = bool(unit) and conversion(role, unit) is None and ratio(unit, "V") is None
-    return foreign or (said is not None and said != role) or bool(_NOT_MEASURED.intersection(_words(name)))
+    return foreign or (said is not None and said != role) or bool(NOT_MEASURED.intersection(words_in(name)))

@@ -66,7 +66,7 @@ def contradictions(runs: Sequence[BenchRun], *, same_command: bool = False) -> l
     [0.39]
     """
     pairs = itertools.combinations(runs, 2)
-    pairs = [(a, b) for a, b in pairs if not (same_command and a.command != b.command) and same_motion(a, b)]
+    pairs = [(a, b) for a, b in pairs if not (same_command and _differ(a, b)) and same_motion(a, b)]
     cycles = {id(run): _mean_cycle(run) for run in {id(run): run for pair in pairs for run in pair}.values()}
     pairs_apart = []
     for a, b in pairs:
@@ -78,6 +78,11 @@ def contradictions(runs: Sequence[BenchRun], *, same_command: bool = False) -> l
         if difference > OTHER_FORCE * level and difference > BEYOND_SCATTER * scatter:
             pairs_apart.append(Contradiction(a.name, b.name, difference, float(difference / level), scatter))
     return sorted(pairs_apart, key=lambda pair: -pair.share)
+
+
+def _differ(a: BenchRun, b: BenchRun) -> bool:
+    """Whether the commands of two records differ; one that varies differs from cycle to cycle."""
+    return a.command != b.command or a.command_channel is not None or b.command_channel is not None
 
 
 def contradictions_in_words(found: Sequence[Contradiction]) -> list[str]:
@@ -103,7 +108,7 @@ def pairs_in_words(found: Sequence[Contradiction]) -> str:
     """
     pairs = "; ".join(
         (f"two records {pair.first}" if pair.first == pair.second else f"{pair.first} and {pair.second}")
-        + f" by {pair.difference:.3g} N ({100 * pair.share:.0f} % of their RMS force"
+        + f" by {pair.difference:.0f} N ({100 * pair.share:.0f} % of their RMS force"
         + (f", where the mean cycle of one is known to {pair.scatter:.2g} N)" if pair.scatter else ")")
         for pair in found[:_NAMED]
     )

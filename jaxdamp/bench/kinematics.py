@@ -12,7 +12,8 @@ from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
 from jaxdamp._files import FOLDER_SUFFIXES, find_files
 from jaxdamp.bench import sign as signs
-from jaxdamp.bench.columns import Choice, split_header
+from jaxdamp.bench.columns import Choice
+from jaxdamp.bench.headers import split_header
 from jaxdamp.bench.raw import RawTable
 from jaxdamp.bench.readers import READERS, read_tables
 from jaxdamp.bench.table_points import Points, in_si, numbers_of

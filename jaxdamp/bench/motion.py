@@ -19,18 +19,25 @@ def crossings(time: Samples, stroke: Samples) -> tuple[Float[np.ndarray, " risin
     outside = np.flatnonzero(side)
     before, after = outside[:-1], outside[1:]
     turns = [np.flatnonzero((side[after] == way) & (side[before] == -way)) for way in (1, -1)]
-    passages = [zip(before[turn].tolist(), after[turn].tolist(), strict=True) for turn in turns]
-    rising, falling = (np.array([_crossing(time, x, *passage) for passage in way], dtype=float) for way in passages)
+    rising, falling = (_instants(time, x, before[turn], after[turn]) for turn in turns)
     return rising, falling
 
 
-def _crossing(time: Samples, x: Samples, start: int, stop: int) -> float:
-    """Where x passes zero between two samples of different sign."""
-    t, y = time[start : stop + 1], x[start : stop + 1]
-    centred = t - t.mean()
-    slope = np.dot(centred, y) / np.dot(centred, centred)
-    instant = t.mean() - y.mean() / slope if slope * y[-1] > 0 else t.mean()
-    return float(np.clip(instant, t[0], t[-1]))
+def _instants(time: Samples, x: Samples, starts: np.ndarray, stops: np.ndarray) -> Float[np.ndarray, " passages"]:
+    """Where x passes zero in each of several passages, between two samples of different sign."""
+    if not starts.size:
+        return np.zeros(0)
+    sizes = stops - starts + 1
+    first = np.cumsum(sizes) - sizes
+    inside = np.arange(sizes.sum()) + np.repeat(starts - first, sizes)
+    begun = time[starts]
+    t, y = time[inside] - np.repeat(begun, sizes), x[inside]
+    mean_t, mean_y = (np.add.reduceat(values, first) / sizes for values in (t, y))
+    centred = t - np.repeat(mean_t, sizes)
+    slope = np.add.reduceat(centred * y, first) / np.add.reduceat(centred**2, first)
+    onwards = slope * x[stops] > 0
+    back = np.divide(mean_y, slope, out=np.zeros_like(slope), where=onwards)
+    return np.clip(begun + (mean_t - back), begun, time[stops])
 
 
 def dominant_frequency(time: Samples, stroke: Samples) -> float:
@@ -109,6 +116,10 @@ def moving_span(time: Samples, stroke: Samples) -> tuple[int, int]:
 
 
 def white_noise(values: Samples) -> float:
-    """Standard deviation of the white noise in a channel, from its third differences; the median leaves out jumps."""
+    """Standard deviation of the white noise in a channel, from its third differences; the median leaves out jumps.
+
+    Arguments:
+        values: samples of the channel, in its unit.
+    """
     differences = np.diff(values, 3)
     return float(np.median(np.abs(differences)) / (0.6745 * np.sqrt(20.0)))

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 
 ORDER = 4  # of the Butterworth filter, which is run forwards and backwards
-FEWEST_POINTS = 64  # of a mean cycle
 CHANNELS = ("stroke", "velocity", "force")
+BESIDE = ("temperature", "command_channel")  # channels that a record may have beside these
 
 
 @final
@@ -32,7 +32,8 @@ class Steps:
 
     Arguments:
         delay: by which the force channel lags behind the stroke channel [s]; the force is read so much later.
-        low_pass: cut-off frequency [Hz] of a zero-phase filter on stroke, velocity and force alike; half is left there.
+        low_pass: cut-off frequency [Hz] of a zero-phase filter on stroke, velocity, force and a command that varies
+            alike; half is left there.
         between: start and end of the part that is kept [s].
         moving: cut off the rest before and after the motion.
         skip_cycles: number of full cycles left out at the beginning.
@@ -128,9 +129,8 @@ def _noted(run: "BenchRun", note: str, **changes: Any) -> "BenchRun":
 
 def _cut(run: "BenchRun", part: np.ndarray | slice, note: str) -> "BenchRun":
     """The samples of a part."""
-    warm = None if run.temperature is None else run.temperature[part]
-    channels = {name: getattr(run, name)[part] for name in ("time", *CHANNELS)}
-    return _noted(run, note, **channels, temperature=warm)
+    names = [name for name in ("time", *CHANNELS, *BESIDE) if getattr(run, name) is not None]
+    return _noted(run, note, **{name: getattr(run, name)[part] for name in names})
 
 
 def _align(run: "BenchRun", delay: float) -> "BenchRun":
@@ -146,7 +146,7 @@ def _align(run: "BenchRun", delay: float) -> "BenchRun":
 
 
 def _low_pass(run: "BenchRun", cutoff: float) -> "BenchRun":
-    """Stroke, velocity and force through a Butterworth filter, forwards and backwards."""
+    """Stroke, velocity, force and a command through a Butterworth filter, forwards and backwards."""
     from scipy.signal import butter, sosfiltfilt
 
     if not cutoff < 0.45 * run.sampling_rate:
@@ -155,7 +155,8 @@ def _low_pass(run: "BenchRun", cutoff: float) -> "BenchRun":
     # Each pass leaves the root of a half at its own cut-off, so that both leave a half there.
     sections = butter(ORDER, cutoff, fs=run.sampling_rate, output="sos")
     pad = min(len(run) - 1, 3 * int(np.ceil(run.sampling_rate / cutoff)))
-    filtered = {name: sosfiltfilt(sections, getattr(run, name), padlen=pad) for name in CHANNELS}
+    names = [*CHANNELS, *["command_channel"] * (run.command_channel is not None)]
+    filtered = {name: sosfiltfilt(sections, getattr(run, name), padlen=pad) for name in names}
     tones = [k * run.frequency for k in (1, 3) if 2 * k * run.frequency < run.sampling_rate]
     gains = [100 * low_pass_gain(tone, cutoff, run.sampling_rate) for tone in tones]
     left = ", ".join(f"{gain:.3g} % at {tone:.3g} Hz" for gain, tone in zip(gains, tones, strict=True))
@@ -212,6 +213,11 @@ def _mean_cycle(run: "BenchRun") -> "BenchRun":
     """The mean cycle at equal steps of time, two periods of it, so that it is a record with a full cycle."""
     from jaxdamp.bench.analysis import fold_cycles
 
+    if run.command_channel is not None:
+        remedy = "Leave `mean_cycle` out, or cut the part in which the command is held."
+        _checks.refuse(
+            "mean_cycle", "be asked for where all cycles are alike", f"{run.name!r}, whose command varies", remedy
+        )
     cycles = fold_cycles(run)
     count, period = len(cycles.periods), float(cycles.periods.mean())
     points = cycles.force.shape[1]

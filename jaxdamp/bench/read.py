@@ -63,14 +63,15 @@ def read(
         force_sign: "same" if the files' force is positive when it resists motion in the positive direction,
             "opposite" if it is negative then. Without it: the same if `sign` is given, otherwise what makes the work
             per cycle positive, because a damper takes in energy.
-        columns: quantity to header or number (from 0) of its column, for "time", "stroke", "velocity", "force" and
-            "temperature"; None leaves the file's column unused.
+        columns: quantity to header or number (from 0) of its column, for "time", "stroke", "velocity", "force",
+            "temperature" and "command"; None leaves the file's column unused.
         units: quantity to unit, where the header has none or a wrong one.
         gains: quantity to gain of its sensor, for columns in volts: `{"force": "500 N/V", "stroke": "10 mm/V - 2 mm"}`.
         sampling_rate: samples per second [Hz], for files without a time column.
         delimiter: the character between columns of text files, if the search fails.
         command: what was set on the damper and held, such as a coil current: one number for all files, a number for
             each record by name or pattern, such as `{"*_0.5A": 0.5, "*_1.0A": 1.0}`, or the name of a setting.
+            Without it, a column of a coil current or voltage is the command; `BenchRun.command_channel` if it varies.
         settings: what else is known of the records: pattern to settings, `{"hot_*": {"temperature": 80}}`, or a pattern
             with names in braces, `"*_{current}A"`, that takes the settings from the names of the records.
         manifest: a TOML file with these arguments; True takes `jaxdamp.toml` of the folder that is read, and a note
@@ -304,12 +305,18 @@ def _commanded(runs: list[tuple[str, BenchRun]], command: Command | None) -> lis
     if command is None:
         return [run for _, run in runs]
     if isinstance(command, str):
-        return [replace(run, command=_setting(run, command)) for _, run in runs]
+        return [_held(run, _setting(run, command)) for _, run in runs]
     if not isinstance(command, Mapping):
-        return [replace(run, command=command) for _, run in runs]
+        return [_held(run, command) for _, run in runs]
     patterns = {base: [key for key in command if fnmatchcase(base, key)] for base, _ in runs}
     _check_patterns(command, patterns)
-    return [replace(run, command=command[patterns[base][0]]) for base, run in runs]
+    return [_held(run, command[patterns[base][0]]) for base, run in runs]
+
+
+def _held(run: BenchRun, command: float | int) -> BenchRun:
+    """The record with a command that is held, whatever its column shows."""
+    note = (f"column of the command left out, since it is stated as {command:g}",) * (run.command_channel is not None)
+    return replace(run.held_at(command), notes=(*run.notes, *note))
 
 
 def _check_patterns(command: Mapping[str, float | int], patterns: Mapping[str, Sequence[str]]) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp.bench import clock, stamps
-from jaxdamp.bench.columns import split_header
+from jaxdamp.bench.headers import split_header
 from jaxdamp.bench.motion import Samples
 from jaxdamp.bench.raw import RawTable
 from jaxdamp.bench.ride_record import RIDE_MARK, RIDE_SETTINGS_MARK, ROAD, ROAD_UNITS, RideRecord

@@ -3,7 +3,7 @@
 import json
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, final
@@ -14,8 +14,10 @@ from jaxtyping import ArrayLike, Float
 from jaxdamp import _checks
 from jaxdamp._types import Figure
 from jaxdamp.bench import clock
+from jaxdamp.bench.headers import COMMAND_HEADER
 from jaxdamp.bench.motion import cycle_instants, cycle_works, dominant_frequency, motion_amplitude
-from jaxdamp.bench.processing import Steps, choose_cycles, cut_between, processed
+from jaxdamp.bench.processing import BESIDE, Steps, choose_cycles, cut_between, processed
+from jaxdamp.bench.units import COMMAND_UNITS
 from jaxdamp.bench.velocity import estimate_velocity
 
 
@@ -54,6 +56,8 @@ class BenchRun:
         temperature: [K], shape (time,), if it was measured.
         command: what was set on the damper for this record and held: coil current, voltage, clicks, in a unit of your
             choice; for laws that take a command (`dampers.with_command`).
+        command_channel: what was set instead if it varies during the record, as measured, shape (time,).
+        command_unit: unit of this channel: "A", "V" or "%".
         settings: what else is known of the record, by name: clicks, temperature, the test.
         source: the file, or what else the record comes from.
         notes: sentences on what was done to the data.
@@ -61,7 +65,8 @@ class BenchRun:
             and no place in the damper.
 
     Raises:
-        ValueError: channels of different lengths, fewer than 20 samples, NaN, time not uniform, constant stroke.
+        ValueError: channels of different lengths, fewer than 20 samples, NaN, time not uniform, constant stroke; a
+            command that is held beside one that varies.
 
     >>> time = np.arange(1000) / 1000
     >>> run = BenchRun.from_arrays("3 Hz", time, 0.01 * np.sin(6 * np.pi * time), 300 * np.cos(6 * np.pi * time))
@@ -82,13 +87,13 @@ class BenchRun:
     notes: tuple[str, ...] = ()
     settings: Mapping[str, float | int | str] = field(default_factory=dict)
     stroke_is_integrated: bool = False
+    command_channel: Float[np.ndarray, " time"] | None = None
+    command_unit: str = ""
     _origin: "Origin | None" = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         where = f"record {self.name!r}"
-        for channel in (*_HEADERS, "temperature"):
-            if channel == "temperature" and self.temperature is None:
-                continue
+        for channel in (*_HEADERS, *(name for name in BESIDE if getattr(self, name) is not None)):
             values = _column(channel, getattr(self, channel), len(self.time))
             clock.check_numbers(values, channel, where)
             values.setflags(write=False)
@@ -96,6 +101,11 @@ class BenchRun:
         if self.command is not None:
             _checks.finite("command", np.asarray(self.command))
             object.__setattr__(self, "command", float(self.command))
+            if self.command_channel is not None:
+                remedy = "Leave out the number, or the channel if it only shows what was held."
+                _checks.refuse("command", "be left out beside a `command_channel`", f"{self.command:g}", remedy)
+        if self.command_channel is not None:
+            _checks.one_of("command_unit", self.command_unit, COMMAND_UNITS)
         object.__setattr__(self, "notes", tuple(self.notes))
         clock.check_count(len(self.time), where)
         clock.check_time(self.time, where)
@@ -111,11 +121,15 @@ class BenchRun:
         velocity: ArrayLike | None = None,
         *,
         temperature: ArrayLike | None = None,
-        command: float | None = None,
+        command: float | ArrayLike | None = None,
+        command_unit: str = "",
         source: str = "",
         notes: Iterable[str] = (),
     ) -> "BenchRun":
-        """A record from arrays in SI and the library's sign; without a velocity it is derived from the stroke."""
+        """A record from arrays in SI and the library's sign; without a velocity it is derived from the stroke.
+
+        A command that is an array, in its unit, is a channel that varies.
+        """
         notes, count = tuple(notes), np.size(time)
         stroke, force = _column("stroke", stroke, count), _column("force", force, count)
         if velocity is None:
@@ -123,7 +137,21 @@ class BenchRun:
             notes = (*notes, how)
         velocity, time = _column("velocity", velocity, count), _column("time", time, count)
         warm = None if temperature is None else _column("temperature", temperature, count)
-        return cls(name, time, stroke, velocity, force, temperature=warm, command=command, source=source, notes=notes)
+        varies = np.ndim(command) > 0 if command is not None else False
+        held = None if varies or command is None else float(np.asarray(command))
+        return cls(
+            name,
+            time,
+            stroke,
+            velocity,
+            force,
+            warm,
+            held,
+            source,
+            notes,
+            command_channel=_column("command", command, count) if varies and command is not None else None,
+            command_unit=command_unit if varies else "",
+        )
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -138,6 +166,17 @@ class BenchRun:
     def duration(self) -> float:
         """Number of samples over sampling rate [s]."""
         return len(self.time) / self.sampling_rate
+
+    @property
+    def commands(self) -> Float[np.ndarray, " time"] | None:
+        """The command at every sample, measured or held; None if neither is known."""
+        if self.command_channel is None and self.command is not None:
+            return np.full(len(self), self.command)
+        return self.command_channel
+
+    def held_at(self, command: float | int) -> "BenchRun":
+        """The same record with a command that is held, whatever its channel shows."""
+        return replace(self, command=float(command), command_channel=None, command_unit="")
 
     @cached_property
     def frequency(self) -> float:
@@ -265,6 +304,8 @@ class BenchRun:
             lines.append(f"  temperature  {warm.min():.1f} … {warm.max():.1f} °C")
         if self.command is not None:
             lines.append(f"  command      {self.command:g}")
+        if (channel := self.command_channel) is not None:
+            lines.append(f"  command      {channel.min():.4g} … {channel.max():.4g} {self.command_unit}".rstrip())
         lines += [f"  {key:<12} {value}" for key, value in self.settings.items()]
         return "\n".join(lines + [f"  - {note}" for note in self.notes])
 
@@ -287,6 +328,8 @@ class BenchRun:
         header = list(_HEADERS.values())
         if self.temperature is not None:
             channels, header = [*channels, self.temperature], [*header, "temperature [K]"]
+        if self.command_channel is not None:
+            channels, header = [*channels, self.command_channel], [*header, f"{COMMAND_HEADER} [{self.command_unit}]"]
         command = [] if self.command is None else [f"{COMMAND_MARK}{self.command!r}"]
         settings = [SETTINGS_MARK + json.dumps(dict(self.settings))] if self.settings else []
         integrated = [INTEGRATED_MARK] * self.stroke_is_integrated

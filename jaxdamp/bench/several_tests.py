@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from jaxdamp.bench.clock import FEWEST
-from jaxdamp.bench.columns import Choice, find_one, split_header
+from jaxdamp.bench.columns import Choice, find_one
+from jaxdamp.bench.headers import split_header
 from jaxdamp.bench.raw import RawColumn, RawTable
 
 

@@ -14,13 +14,15 @@ from jaxdamp._checks import ArgumentError, Setting
 if TYPE_CHECKING:
     import pint
 
-SI = {"time": "s", "stroke": "m", "velocity": "m/s", "force": "N", "temperature": "K"}
+SI = {"time": "s", "stroke": "m", "velocity": "m/s", "force": "N", "temperature": "K", "command": "A"}
+COMMAND_UNITS = ("A", "V", "%")  # of a command that is measured: a coil current, a voltage, a duty cycle
 USUAL = {
     "time": ("s", "ms", "us", "min"),
     "stroke": ("mm", "m", "cm", "in", "um"),
     "velocity": ("m/s", "mm/s", "cm/s", "in/s", "ft/s"),
     "force": ("N", "kN", "daN", "lbf", "kgf"),
     "temperature": ("degC", "K", "degF"),
+    "command": ("A", "mA", "V", "mV", "%"),
 }
 # The units of nearly all files: pint takes half a second to load, of the three until a first fit.
 _KNOWN = {
@@ -29,7 +31,14 @@ _KNOWN = {
     "velocity": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "in/s": 0.0254},
     "force": {"N": 1.0, "daN": 10.0, "kN": 1e3},
 }
-GAINS = {"time": "0.001 s", "stroke": "10 mm", "velocity": "0.5 m/s", "force": "500 N", "temperature": "100 K"}
+GAINS = {
+    "time": "0.001 s",
+    "stroke": "10 mm",
+    "velocity": "0.5 m/s",
+    "force": "500 N",
+    "temperature": "100 K",
+    "command": "0.5 A",
+}
 SIGNALS = ("count", "counts", "digit", "digits", "ma", "mv/v", "%fs")  # units of a signal, beside volts
 # How bench software writes units that pint reads as something else or not at all, in lower case, per quantity.
 _WRITTEN = {
@@ -56,20 +65,28 @@ _WRITTEN = {
         "f": "degF",
         "deg f": "degF",
     },
+    "command": {"amp": "A", "amps": "A", "ampere": "A", "volt": "V", "volts": "V"},
 }
 
 
 @dataclass(frozen=True)
 class Conversion:
-    """SI value = factor · value + offset, from the unit named."""
+    """SI value = factor · value + offset, from the unit named; the SI unit where a quantity has several."""
 
     unit: str
     factor: float
     offset: float = 0.0
+    si: str = ""
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
         """The values in SI."""
         return values if self.factor == 1.0 and self.offset == 0.0 else values * self.factor + self.offset
+
+
+_COMMANDS = {
+    unit: Conversion(unit, 1e-3 if unit.startswith("m") else 1.0, si=unit.removeprefix("m"))
+    for unit in USUAL["command"]
+}
 
 
 @lru_cache(maxsize=1)
@@ -96,6 +113,8 @@ def conversion(role: str, written: str) -> Conversion | None:
     exact = {unit.lower(): unit for unit in USUAL[role]}
     if text not in USUAL[role]:
         text = _WRITTEN[role].get(text.lower()) or exact.get(text.lower()) or text
+    if role == "command":
+        return _COMMANDS.get(text)
     if any(text in units for units in _KNOWN.values()):
         factor = _KNOWN.get(role, {}).get(text)
         return None if factor is None else Conversion(text, factor)
@@ -119,6 +138,10 @@ def is_unit(written: str) -> bool:
 @lru_cache(maxsize=256)
 def ratio(written: str, other: str) -> float | None:
     """How many of another unit one of this unit is, or None if they measure different things.
+
+    Arguments:
+        written: this unit, such as "lbf".
+        other: the other unit, such as "N".
 
     >>> ratio("mV", "V"), ratio("mm", "V"), ratio("digits", "digits")
     (0.001, None, 1.0)
@@ -205,4 +228,4 @@ def gain_conversion(role: str, gain: str, written: str, where: str) -> Conversio
     shift = 0.0 if offset is None else float(sign + "1") * float(offset) * of_offset.factor + of_offset.offset
     if offset is None and out.offset:
         shift = out.offset  # a sensor in degrees Celsius without offset counts from 0 °C
-    return Conversion(f"{written or divisor} at {gain.strip()}", float(size) * out.factor * scale, shift)
+    return Conversion(f"{written or divisor} at {gain.strip()}", float(size) * out.factor * scale, shift, out.si)

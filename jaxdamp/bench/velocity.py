@@ -24,6 +24,8 @@ from jaxdamp.bench.motion import Samples, cycle_instants, dominant_frequency
 METHODS = ("harmonic", "savitzky-golay")
 _HARMONICS = 8
 _STEADY = 0.004  # amplitude by which a cycle may differ from the mean cycle
+_UNSTEADY = 0.5  # the same, beyond which a look at some of the samples is enough
+_ENOUGH, _A_CYCLE = 20_000, 20  # samples, in all and in a cycle, of such a look
 _LAST_SHARE = 0.005  # of the highest harmonics in the velocity, relative to the fundamental
 _QUIET = 0.03  # residual, relative to the amplitude, that is taken for ripple and noise of any colour
 
@@ -110,11 +112,12 @@ def _least_squares(basis: Float[np.ndarray, "time columns"], values: Samples) ->
     return np.linalg.solve(gram, (basis.T @ values) / scale) / scale
 
 
-def _derivative(phase: Samples, omega: float, coefficients: Float[np.ndarray, " columns"]) -> Samples:
+def _derivative(
+    basis: Float[np.ndarray, "time columns"], omega: float, coefficients: Float[np.ndarray, " columns"]
+) -> Samples:
     """Time derivative of the fitted wave."""
     count = (len(coefficients) - 1) // 2
     order = omega * np.arange(1, count + 1)
-    basis = _basis(phase, count)
     return basis[:, count + 1 :] @ (-order * coefficients[1 : count + 1]) + basis[:, 1 : count + 1] @ (
         order * coefficients[count + 1 :]
     )
@@ -126,7 +129,7 @@ def _fit_frequency(t: Samples, stroke: Samples, omega: float, harmonics: int) ->
     for _ in range(12):
         basis = _basis(omega * t, harmonics)
         coefficients = _least_squares(basis, stroke)
-        slope = _derivative(omega * t, omega, coefficients) * t / omega  # derivative of the wave by the frequency
+        slope = _derivative(basis, omega, coefficients) * t / omega  # derivative of the wave by the frequency
         both = _least_squares(np.concatenate([basis, slope[:, None]], axis=1), stroke)
         omega += float(both[-1])
         if abs(both[-1]) < 1e-13 * abs(omega) or omega <= 0:
@@ -142,17 +145,23 @@ def _fit_harmonics(time: Samples, stroke: Samples, frequency: float) -> _Fit | N
         return None
     t = time - time.mean()
     guess = 2 * np.pi * frequency
-    omega, _ = _fit_frequency(t, stroke, guess, 1)
+    thin = slice(None, None, max(min(len(t) // _ENOUGH, int(rate / frequency / _A_CYCLE)), 1))
+    omega, wave = _fit_frequency(t[thin], stroke[thin], guess, 1)
     if abs(omega / guess - 1) > 0.1:
         return None
+    left = stroke[thin] - _basis(omega * t[thin], 1) @ wave
+    if np.any(_in_cycles(t[thin], left, omega)[0] > _UNSTEADY * np.hypot(*wave[1:])):
+        return None
+    omega, _ = _fit_frequency(t, stroke, omega, 1)
     used = _significant(stroke, _basis(omega * t, most))
     if used is None:
         return None
     omega, coefficients = _fit_frequency(t, stroke, omega, used)
-    residual = stroke - _basis(omega * t, used) @ coefficients
+    basis = _basis(omega * t, used)
+    residual = stroke - basis @ coefficients
     if not _steady(t, residual, omega, float(np.hypot(coefficients[1], coefficients[1 + used]))):
         return None
-    return _Fit(omega / (2 * np.pi), used, _derivative(omega * t, omega, coefficients))
+    return _Fit(omega / (2 * np.pi), used, _derivative(basis, omega, coefficients))
 
 
 def _significant(stroke: Samples, basis: Float[np.ndarray, "time columns"]) -> int | None:
@@ -180,14 +189,19 @@ def _steady(t: Samples, residual: Samples, omega: float, amplitude: float) -> bo
     spread = float(np.sqrt(np.mean(residual**2)))
     if spread < 1e-7 * amplitude:
         return True
+    local, most = _in_cycles(t, residual, omega)
+    white = float(np.std(np.diff(residual)) / np.sqrt(2))
+    allowed = _STEADY * amplitude + 4 * white * np.sqrt(2 / most)
+    return bool(np.all(local < allowed) and (spread < _QUIET * amplitude or spread < 1.3 * white))
+
+
+def _in_cycles(t: Samples, residual: Samples, omega: float) -> tuple[Float[np.ndarray, " cycles"], int]:
+    """The fundamental of what a wave leaves in each whole cycle, and the number of samples of the longest one."""
     cycle = np.floor(omega * (t - t[0]) / (2 * np.pi) + 1e-9).astype(int)
     count = np.bincount(cycle)
     full = count >= 0.9 * count.max()
     cosine, sine = (np.bincount(cycle, wave(omega * t) * residual) for wave in (np.cos, np.sin))
-    local = 2 * np.hypot(cosine, sine) / np.maximum(count, 1)
-    white = float(np.std(np.diff(residual)) / np.sqrt(2))
-    allowed = _STEADY * amplitude + 4 * white * np.sqrt(2 / count.max())
-    return bool(np.all(local[full] < allowed) and (spread < _QUIET * amplitude or spread < 1.3 * white))
+    return (2 * np.hypot(cosine, sine) / np.maximum(count, 1))[full], int(count.max())
 
 
 def _window(stroke: Samples, rate: float, frequency: float) -> tuple[int, int]:

@@ -2,7 +2,7 @@
 
 import zlib
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, final
 
 import equinox as eqx
@@ -13,127 +13,16 @@ from jaxtyping import Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp.bench.clock import FEWEST, Part, regular_parts
+from jaxdamp.bench.command_steps import CommandedExcitation
 from jaxdamp.bench.motion import Samples
 from jaxdamp.bench.programmes import Excitation
 from jaxdamp.bench.runs import BenchRun
+from jaxdamp.bench.sensors import Sensors, described
 from jaxdamp.bench.sets import BenchSet
 from jaxdamp.bench.velocity import estimate_velocity
-from jaxdamp.dampers import AbstractDamper, Heated, require_finite_force
+from jaxdamp.dampers import AbstractDamper, Heated, check_commands, require_finite_force
 from jaxdamp.parameters import modules_inside, parameters
 from jaxdamp.rig import Rig
-
-
-def _fault(unit: str, default: float | None = 0.0) -> Any:
-    """A field for the size of a fault, with its unit."""
-    return field(default=default, metadata={"unit": unit})
-
-
-@final
-@dataclass(frozen=True)
-class Sensors:
-    """How a machine's force and stroke channels distort what they measure. By default they do not.
-
-    Each channel goes through these in turn: hum and noise, spikes (force only), reversed sign (force only), limits,
-    resolution, a channel that sticks.
-
-    Arguments:
-        force_noise: standard deviation of the white noise of the load cell [N].
-        stroke_noise: and of the stroke sensor [m].
-        mains_ripple: amplitude of the mains hum in the force [N].
-        stroke_ripple: and in the stroke [m].
-        mains_frequency: of the hum [Hz].
-        spike_rate: mean number of spikes in the force per second [1/s]. A spike is one sample.
-        spike_size: of a spike [N], of either sign.
-        force_limit: magnitude at which the force channel is clipped [N]; none if left out.
-        stroke_limit: and the stroke channel [m].
-        force_resolution: step to which the force is rounded [N]; zero rounds nothing.
-        stroke_resolution: and the stroke [m].
-        clock_jitter: standard deviation by which an instant of sampling differs from the time written to it [s].
-        stamped_jitter: write the instants of sampling as they are; the record is then resampled, as by `bench.read`.
-        reversed_force: write the force with the wrong sign.
-        force_stuck_from: instant from which the force channel repeats its value [s]; never if left out.
-        stroke_stuck_from: and the stroke channel [s].
-
-    Raises:
-        ValueError: a negative size, rate or resolution; a limit or mains frequency that is not positive.
-    """
-
-    force_noise: float | int = _fault("N")
-    stroke_noise: float | int = _fault("m")
-    mains_ripple: float | int = _fault("N")
-    stroke_ripple: float | int = _fault("m")
-    mains_frequency: float | int = _fault("Hz", 50.0)
-    spike_rate: float | int = _fault("1/s")
-    spike_size: float | int = _fault("N")
-    force_limit: float | int | None = _fault("N", None)
-    stroke_limit: float | int | None = _fault("m", None)
-    force_resolution: float | int = _fault("N")
-    stroke_resolution: float | int = _fault("m")
-    clock_jitter: float | int = _fault("s")
-    stamped_jitter: bool = False
-    reversed_force: bool = False
-    force_stuck_from: float | int | None = _fault("s", None)
-    stroke_stuck_from: float | int | None = _fault("s", None)
-
-    def __post_init__(self) -> None:
-        for argument in ("mains_frequency", "force_limit", "stroke_limit"):
-            if getattr(self, argument) is not None:
-                _checks.positive(argument, getattr(self, argument))
-        for each in fields(self):
-            if each.metadata and getattr(self, each.name) is not None:
-                _checks.nonnegative(each.name, getattr(self, each.name))
-
-    def instants(self, time: Samples, seed: list[int]) -> Samples:
-        """The instants [s] at which the samples are taken whose time is written as this."""
-        return time + self.clock_jitter * np.random.default_rng([*seed, 1]).standard_normal(len(time))
-
-    def show(self, time: Samples, stroke: Samples, force: Samples, seed: list[int]) -> tuple[Samples, Samples]:
-        """What the stroke channel [m] and the force channel [N] show.
-
-        Arguments:
-            time: instants as written [s].
-            stroke: at the stroke sensor [m].
-            force: at the load cell [N].
-            seed: of all that is random.
-        """
-        rng, more = np.random.default_rng(seed), np.random.default_rng([*seed, 2])
-        phase = rng.uniform(0, 2 * np.pi, 2)
-        hum = 2 * np.pi * self.mains_frequency * time
-        stroke = stroke + self.stroke_ripple * np.sin(hum + phase[0])
-        stroke = stroke + self.stroke_noise * rng.standard_normal(len(time))
-        force = force + self.mains_ripple * np.sin(hum + phase[1]) + self.force_noise * rng.standard_normal(len(time))
-        hit = more.random(len(time)) < self.spike_rate * (time[1] - time[0])
-        force = force + hit * self.spike_size * more.choice([-1.0, 1.0], len(time))
-        force = -force if self.reversed_force else force
-        force = _converted(force, self.force_limit, self.force_resolution)
-        stroke = _converted(stroke, self.stroke_limit, self.stroke_resolution)
-        return _stuck(time, stroke, self.stroke_stuck_from), _stuck(time, force, self.force_stuck_from)
-
-    def described(self) -> list[str]:
-        """The faults that are there, with their sizes."""
-        there = [each for each in fields(self) if getattr(self, each.name) != each.default]
-        return [described(each.name, getattr(self, each.name), each.metadata.get("unit", "")) for each in there]
-
-
-def described(name: str, value: Any, unit: str) -> str:
-    """A setting in words: "force delay 0.003 s"."""
-    words = name.replace("_", " ")
-    return words if value is True else f"{words} {float(value):g} {unit}".rstrip()
-
-
-def _converted(values: Samples, limit: float | None, resolution: float) -> Samples:
-    """A channel clipped at a limit and rounded to a resolution."""
-    if limit is not None:
-        values = np.clip(values, -limit, limit)
-    return resolution * np.round(values / resolution) if resolution > 0 else values
-
-
-def _stuck(time: Samples, values: Samples, since: float | None) -> Samples:
-    """A channel that repeats its value from an instant on."""
-    if since is None or since > time[-1]:
-        return values
-    first = int(np.searchsorted(time, since))
-    return np.where(time >= since, values[first], values)
 
 
 Channels = Float[np.ndarray, "tests time"]
@@ -151,7 +40,8 @@ class VirtualDyno:
     is not the true one but `estimate_velocity` of the measured stroke, as in records read from files. A machine that
     heats the damper begins with the warm-up of each test.
 
-    Rest, run-up and run-down belong to the tests (`SineTest`).
+    Rest, run-up and run-down belong to the tests (`SineTest`). A test with a command (`CommandStep`) sets the damper,
+    behind the lag of its actuator (`command_lag`), and the record holds the command that was set as a channel.
 
     Arguments:
         law: the damper. Friction that sticks and slips is a law too: `law + dampers.StribeckFriction(...)`.
@@ -233,7 +123,8 @@ class VirtualDyno:
             One record per test.
 
         Raises:
-            ValueError: no test, a test that gives fewer than 20 samples or has fewer than 4 samples a period.
+            ValueError: no test, a test that gives fewer than 20 samples or has fewer than 4 samples a period; a test
+                with a command for a law that takes none, or with steps shorter than two samples.
         """
         programme = list(tests) if isinstance(tests, Iterable) else [tests]
         if not programme:
@@ -262,6 +153,11 @@ class VirtualDyno:
                 f"{self.sampling_rate:g} Hz, which gives {count} and {per_period:.3g}",
                 "Sample faster, or record more cycles.",
             )
+        if isinstance(test, CommandedExcitation):
+            check_commands(f"command of {test.name!r}", self.law, test.command(np.arange(count) / self.sampling_rate))
+            if test.shortest_rise * self.sampling_rate < 2:
+                must = f"be at least two samples of {test.name!r}, {2 / self.sampling_rate:g} s"
+                _checks.refuse("rise", must, test.shortest_rise, "A record cannot show a faster step: sample faster.")
 
     def _fine_grid(self, test: Excitation) -> tuple[float, int, int]:
         """Step [s], steps of the warm-up and number of instants of the grid on which the law is integrated.
@@ -277,9 +173,9 @@ class VirtualDyno:
         return step, before, -(-needed // unit) * unit
 
     def _groups(self, programme: list[Excitation]) -> list[list[int]]:
-        """Numbers of the tests whose grids have the same length."""
-        counts = [self._fine_grid(test)[2] for test in programme]
-        return [[i for i, count in enumerate(counts) if count == length] for length in dict.fromkeys(counts)]
+        """Numbers of the tests whose grids have the same length, with a command or without."""
+        kinds = [(self._fine_grid(test)[2], isinstance(test, CommandedExcitation)) for test in programme]
+        return [[i for i, kind in enumerate(kinds) if kind == alike] for alike in dict.fromkeys(kinds)]
 
     def _readings(self, tests: list[Excitation]) -> tuple[list[Samples], Channels, Channels]:
         """Fine grids [s] of tests with equal grids; there, force at the load cell [N] and temperature [K]."""
@@ -289,7 +185,10 @@ class VirtualDyno:
             grids.append(step * np.arange(-before, count - before))
         strokes = np.stack([test.stroke(grid) for test, grid in zip(tests, grids, strict=True)])
         velocities = np.stack([test.velocity(grid) for test, grid in zip(tests, grids, strict=True)])
-        force, temperature = _exact_readings(self.law, self.rig, np.stack(grids), strokes, velocities)
+        pairs = zip(tests, grids, strict=True)
+        commands = [test.command(grid) for test, grid in pairs if isinstance(test, CommandedExcitation)]
+        command = np.stack(commands) if commands else None
+        force, temperature = _exact_readings(self.law, self.rig, np.stack(grids), strokes, velocities, command)
         return grids, force, temperature
 
     def _record(self, test: Excitation, grid: Samples, force: Samples, temperature: Samples) -> BenchRun:
@@ -306,7 +205,11 @@ class VirtualDyno:
         velocity, how = estimate_velocity(time, stroke)
         warm = np.interp(time, grid, temperature) if self.temperature_channel else None
         notes = (*made, how)
-        return BenchRun(test.name, time, stroke, velocity, force, warm, source="virtual dyno", notes=notes)
+        run = BenchRun(test.name, time, stroke, velocity, force, warm, source="virtual dyno", notes=notes)
+        if not isinstance(test, CommandedExcitation):
+            return run
+        command = self.sensors.shown_command(time, test.command(time), seed)
+        return replace(run, command_channel=command, command_unit=test.command_unit)
 
     def _stamped(self, taken: Samples, name: str) -> Part:
         """Uniform instants for those at which the samples were taken."""
@@ -333,12 +236,13 @@ def _names(kind: type) -> list[str]:
 
 
 def _exact_readings(
-    law: AbstractDamper, rig: Rig, time: Channels, stroke: Channels, velocity: Channels
+    law: AbstractDamper, rig: Rig, time: Channels, stroke: Channels, velocity: Channels, command: Channels | None
 ) -> tuple[Channels, Channels]:
     """`Rig.readings` for several tests, in float64 whatever the session's precision: its steps are microseconds."""
     with jax.enable_x64(True):
         law_64, rig_64 = jax.tree.map(lambda a: a.astype(np.float64) if eqx.is_inexact_array(a) else a, (law, rig))
-        channels = (jax.numpy.asarray(channel) for channel in (time, stroke + rig_64.stroke_offset, velocity))
-        force, temperature = map(np.asarray, jax.vmap(lambda t, x, v: rig_64.readings(law_64, t, x, v))(*channels))
+        channels = jax.tree.map(jax.numpy.asarray, (time, stroke + rig_64.stroke_offset, velocity, command))
+        readings = jax.vmap(lambda t, x, v, u: rig_64.readings(law_64, t, x, v, command=u))(*channels)
+        force, temperature = map(np.asarray, readings)
     require_finite_force(law, force, "over the whole programme")
     return force, temperature

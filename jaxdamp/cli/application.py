@@ -136,16 +136,17 @@ def command(name: str) -> Command:
     target = COMMANDS[name]
 
     def run(*, debug: bool = False, **given: Any) -> None:
-        from jaxdamp.cli import console, early, showing
+        from jaxdamp.cli import console, early, resuming, showing
 
         with console.plain_errors(debug):
             early.check(name, given)
+            noted = resuming.noted(name, given)
             read = options.values(target, given)
             console.prepare()
             module, _, function = target.rpartition(".")
             screen = console.Screen()
             arguments = options.build(target, {("screen",): screen, **read})
-            with showing.chosen(given, screen):
+            with showing.chosen(given, screen), noted:
                 getattr(import_module(f"jaxdamp.{module}"), function)(**arguments)
 
     switch = inspect.Parameter("debug", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=DEBUG)

@@ -13,7 +13,7 @@ from jaxdamp.cli.jobs import Output, job, write_tables
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.records import Reading, decisions, value_of
 from jaxdamp.cli.vehicle_words import read_law
-from jaxdamp.report import baseline_table, bench_report, law_evaluation, records_table
+from jaxdamp.report import baseline_table, bench_report, bench_verdict, law_evaluation, records_table
 
 
 def bench_command(
@@ -52,9 +52,9 @@ def bench_command(
             beneath = None if baseline is None else _baseline(baseline, evaluation, reading)
         check = None if chosen is None else evaluation.check(chosen)
         tables = evaluation.tables()
-        for name in ("velocities", "settings"):
-            screen.table(tables[name])
-        screen.details(*(tables[name] for name in ("peak_forces", "loops")))
+        screen.answer(*bench_verdict(evaluation, limits=check))
+        screen.table(tables["velocities"])
+        screen.details(*(tables[name] for name in ("settings", "peak_forces", "loops")))
         screen.remarks(evaluation.notes, style="yellow")
         if check is not None:
             screen.table(check.table())

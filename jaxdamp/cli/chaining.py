@@ -33,6 +33,7 @@ def report(
     search: Annotated[Call, "tune.minimise"],
     reading: Reading,
     driving: Driving,
+    resume: bool = False,
     output: Output,
 ) -> None:
     """The whole chain on one page: bench records, fitted laws, rides on the best one, and its tuning.
@@ -51,7 +52,7 @@ def report(
         _checks.refuse("road", "be one to ride on", repr(road), "Take iso:CLASS.")
     (surface,), run = driving.over(road)
     screen.points(unusual(road, driving.speed), style="yellow")
-    with job(screen, "report", output) as work:
+    with job(screen, "report", output, resume=resume) as work:
         with screen.stage("Reading the records"):
             raw = reading.raw(files)
         sound, preflight = reading.checked(screen, raw, refuse=True)

@@ -10,6 +10,8 @@ import equinox as eqx
 import numpy as np
 
 from jaxdamp import Ride, export
+from jaxdamp._display import display
+from jaxdamp._pieces import piece
 from jaxdamp._tables import Column, Table, plain, typeset_unit
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.jobs import without_range_warnings, write_tables
@@ -113,7 +115,8 @@ def choose(
     order = np.argsort(np.where(met, score, np.inf) if any(met) else score, kind="stable")
     best = int(order[0])
     units = {m.name: typeset_unit(m.unit(car.units)) for m in rides[0].metrics}
-    number = f"{wanted[0]} {rows[best][wanted[0]]:.4g} {units[wanted[0]]}"
+    shown = display().of(units[wanted[0]])
+    number = f"{wanted[0]} {shown(rows[best][wanted[0]]):.4g} {shown.unit}"
     verdict = _verdict(settings[best], number, met)
     if sum(met) > 1:
         verdict += f" {_beside_next(on_roads[order[:2]], settings[int(order[1])], white=white)}"
@@ -137,8 +140,12 @@ def _table(
 
 def _driven(rides: Sequence[Ride], vehicle: AbstractVehicle) -> dict[str, list[float]]:
     """The metrics of a vehicle on each ride."""
-    each = [ride.of_vehicle(vehicle)() for ride in rides]
-    return {name: [float(values[name]) for values in each] for name in each[0]}
+
+    def driven() -> dict[str, list[float]]:
+        each = [ride.of_vehicle(vehicle)() for ride in rides]
+        return {name: [float(values[name]) for values in each] for name in each[0]}
+
+    return piece(("setting", vehicle, rides), driven)
 
 
 def _means(metrics: Mapping[str, Sequence[float]]) -> dict[str, float]:

@@ -1,19 +1,34 @@
 """A controller as a word of the command line."""
 
+import functools
+import inspect
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
 
 from jaxdamp import _checks, control
+from jaxdamp.cli.vehicle_words import read_module
 from jaxdamp.dampers import AbstractDamper, takes_command
 from jaxdamp.vehicles import AbstractVehicle
 
 
-POLICIES: dict[str, type[control.AbstractPolicy]] = {
+def _preview(gain: float, delay: float, skyhook: float = 3000.0) -> control.Preview:
+    """Preview over skyhook at every damper."""
+    return control.Preview(control.Skyhook(skyhook), [gain], delay)
+
+
+Policy: TypeAlias = control.AbstractPolicy | control.AbstractVehiclePolicy
+POLICIES: dict[str, Callable[..., Policy]] = {
     "skyhook": control.Skyhook,
+    "band-skyhook": control.BandSkyhook,
+    "modal-skyhook": control.ModalSkyhook,
     "groundhook": control.Groundhook,
-    "hybrid": control.Hybrid,
+    "hybrid": control.HybridHook,
     "acceleration-driven": control.AccelerationDriven,
     "power-driven": control.PowerDriven,
     "state-feedback": control.StateFeedback,
+    "preview": _preview,
 }
 
 
@@ -22,9 +37,10 @@ class Controlling:
     """How the dampers are commanded while they drive.
 
     Arguments:
-        controller: a policy and its numbers, such as skyhook:gain=3000 (skyhook, groundhook, hybrid,
-            acceleration-driven, power-driven, state-feedback); the law must take a command. The baseline, if none is
-            given, is the same law at its own command.
+        controller: a policy and its numbers, such as skyhook:gain=3000 (skyhook, band-skyhook, modal-skyhook,
+            groundhook, hybrid, acceleration-driven, power-driven, state-feedback, preview, lqr), or the
+            controller.json of a tuning; the law must take a command. The baseline of a ride, if none is given, is the
+            same law at its own command.
         period: between two samples of the controller [s].
         delay: from a sample to its command [s].
         actuator_lag: time constant of the valve or the coil [s].
@@ -37,34 +53,45 @@ class Controlling:
     actuator_lag: float = 0.0
     sensor_lag: float = 0.0
 
-    def of(self, car: AbstractVehicle, law: AbstractDamper) -> AbstractVehicle:
-        """The vehicle with a law under the controller; itself if there is none."""
+    def of(self, car: AbstractVehicle, law: AbstractDamper | None) -> AbstractVehicle:
+        """The vehicle with a law, or its own, under the controller; itself if there is none."""
         if self.controller is None:
             return car
-        if not takes_command(law):
+        if law is not None and not takes_command(law):
             remedy = "The law that jaxdamp fit makes of records at several commands does."
             _checks.refuse("law", "take a command, which --controller sets", type(law).__name__, remedy)
-        lags = {"actuator_lag": self.actuator_lag, "sensor_lag": self.sensor_lag}
-        return control.Controlled(car, parse_policy(self.controller), **lags, period=self.period, delay=self.delay)
+        policy = parse_policy(self.controller, car)
+        times = {field: getattr(self, field) for field in ("period", "delay", "actuator_lag", "sensor_lag")}
+        return control.Controlled(car, policy, **times)
 
 
-def parse_policy(word: str) -> control.AbstractPolicy:
-    """The policy that a word means, such as "hybrid:gain=3000,share=0.7".
+def parse_policy(word: str, car: AbstractVehicle) -> Policy:
+    """The policy that a word means, such as "hybrid:gain=3000,share=0.7", or the file of one.
 
-    >>> parse_policy("skyhook:gain=2000")
+    Arguments:
+        word: name and numbers, or a JSON file.
+        car: for which "lqr" is computed.
+
+    >>> from jaxdamp.vehicles.presets import quarter_car_000
+    >>> parse_policy("skyhook:gain=2000", quarter_car_000())
     Skyhook(gain=2000.0, lead=0.0)
     """
+    if word.endswith(".json"):
+        kinds = (control.AbstractPolicy, control.AbstractVehiclePolicy)
+        return read_module("controller", Path(word), kinds, "a policy", "`jaxdamp tune --controller` writes it.")
+    known = POLICIES | {"lqr": functools.partial(control.lqr, car)}
     name, _, rest = word.partition(":")
-    _checks.one_of("controller", name, POLICIES)
+    _checks.one_of("controller", name, known)
     try:
         pairs = (part.split("=") for part in rest.split(",") if part)
         numbers = {key.strip(): float(value) for key, value in pairs}
     except ValueError:
         _checks.refuse("controller", "read like skyhook:gain=3000,lead=0.01", repr(word))
-    fields = list(POLICIES[name].__dataclass_fields__)
+    fields = inspect.signature(known[name]).parameters
     for key in numbers:
         _checks.one_of("controller", key, fields)
-    if name == "power-driven" and "stiffness" not in numbers:
-        remedy = "Write power-driven:stiffness=20000, the rate of the suspension spring [N/m]."
-        _checks.refuse("controller", "have a stiffness", repr(word), remedy)
-    return POLICIES[name](**numbers)
+    missing = [key for key, field in fields.items() if field.default is field.empty and key not in numbers]
+    if missing:
+        remedy = f"Write {name}:{','.join(f'{key}=NUMBER' for key in missing)}."
+        _checks.refuse("controller", f"have a {' and a '.join(missing)}", repr(word), remedy)
+    return known[name](**numbers)

@@ -7,6 +7,7 @@ from typing import Any, NoReturn
 from jaxdamp import _checks
 from jaxdamp._documents import parse_json, read_text, read_toml
 from jaxdamp._files import FOLDER_SUFFIXES, find_files
+from jaxdamp.cli import resuming
 from jaxdamp.cli.results import refuse_target
 
 
@@ -28,7 +29,8 @@ def check(command: str, given: Mapping[str, Any]) -> None:
         ValueError: such a path, file or folder.
     """
     if "out" in given:
-        refuse_target(given["out"] or Path(f"jaxdamp-{command}"), command, replace=bool(given["replace"]))
+        again = {"replace": bool(given["replace"]), "resume": bool(given.get("resume"))}
+        refuse_target(resuming.target_of(command, given), command, **again)
     if given.get("files"):
         find_files(given["files"], FOLDER_SUFFIXES)
     for name in ("law", "start", "baseline"):
@@ -74,7 +76,7 @@ def read_vehicle(path: Path) -> dict[str, Any]:
     try:
         return read_toml(path)
     except ValueError as error:
-        _checks.refuse("vehicle", "be TOML", error, EXAMPLE)
+        _refuse_content("vehicle", "be TOML", path, error, EXAMPLE)
 
 
 def read_json(argument: str, path: Path, words: str, remedy: str = "") -> None:
@@ -87,10 +89,21 @@ def read_json(argument: str, path: Path, words: str, remedy: str = "") -> None:
         remedy: where such a file comes from.
     """
     require_file(argument, path, remedy)
+    must = f"be {words} as JSON"
     try:
-        parse_json(read_text(path, "JSON"))
+        text = read_text(path, "JSON")
     except ValueError as error:
-        _checks.refuse(argument, f"be {words} as JSON", f"{path}: {error}", remedy)
+        _refuse_content(argument, must, path, error, remedy)
+    try:
+        parse_json(text)
+    except ValueError as error:
+        _refuse_content(argument, must, path, f"is no JSON: {error}", remedy)
+
+
+def _refuse_content(argument: str, must: str, path: Path, error: object, remedy: str) -> NoReturn:
+    """Refuse a file for what it holds, in the words of the error, which may begin with its name."""
+    said = str(error).removeprefix(f"{path} ").rstrip(".")
+    _checks.refuse(argument, must, f"{path}, which {said}", remedy)
 
 
 def refuse_road(text: str) -> NoReturn:

@@ -48,12 +48,15 @@ class OneFile:
         return file
 
 
-def export_command(screen: Screen, law: Path, *, to: str, velocities: str | None = None, output: OneFile) -> None:
-    """Write a law as C, as FMU or as the table of a simulator; or a whole vehicle as C or FMU.
+def export_command(
+    screen: Screen, law: Path, *, to: str, part: str = "whole", velocities: str | None = None, output: OneFile
+) -> None:
+    """Write a law as C, as FMU or as the table of a simulator; or a whole vehicle, or its controller, as C or FMU.
 
     Arguments:
         law: a law as JSON, such as best_law.json of jaxdamp fit; or a vehicle, for c and fmu.
         to: adams, assetto-corsa, c, carsim, csv, fmu or matlab.
+        part: whole, or controller for the controller of a vehicle alone, as c or fmu.
         velocities: of a table, FROM:TO:POINTS [m/s]; those the law was fitted to, or -1:1:41.
     """
     _checks.one_of("to", to, sorted(PROGRAMS | TABLES))
@@ -63,8 +66,10 @@ def export_command(screen: Screen, law: Path, *, to: str, velocities: str | None
         if velocities is not None:
             _checks.refuse("velocities", f"be left out for {to}", velocities, "It has the law itself, not a table.")
         kinds, remedy = (AbstractDamper, AbstractVehicle), "Give the JSON of a law or of a vehicle."
-        written = write(read_module("law", law, kinds, "a law or a vehicle", remedy), file)
+        written = write(read_module("law", law, kinds, "a law or a vehicle", remedy), file, part=part)
     else:
+        if part != "whole":
+            _checks.refuse("part", f"be left out for {to}", part, "A table has a law alone.")
         damper = read_law("law", law)
         grid = _grid(damper, velocities)
         screen.say(f"Velocities: {grid.size} from {grid[0]:g} to {grid[-1]:g} m/s, positive in rebound.")

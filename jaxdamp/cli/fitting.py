@@ -10,11 +10,11 @@ from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.interrupt import Interrupted
 from jaxdamp.cli.jobs import Job, Output, job, write_tables
+from jaxdamp.cli.limits import bounds_in_si
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.records import Reading, decisions, grouped, law_names, split
 from jaxdamp.cli.table_fitting import Refused, fit_table, records_of, through_points
 from jaxdamp.cli.vehicle_words import read_law
-from jaxdamp.cli.wording import in_command_line
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Comparison, CrossValidation, Failure, Rung
 from jaxdamp.report import (
@@ -60,6 +60,7 @@ def fit(
     cross_validate: bool = False,
     baseline: Path | None = None,
     report: Path | None = None,
+    resume: bool = False,
     output: Output,
 ) -> None:
     """Fit damper laws to bench records, and say how good they are.
@@ -88,7 +89,7 @@ def fit(
     beside = None if baseline is None else read_law("baseline", baseline)
     if report is not None and group_by is not None:
         _checks.refuse("report", "be left out with --group-by, which writes a page for each group", str(report))
-    with job(screen, "fit", output, report) as work:
+    with job(screen, "fit", output, report, resume=resume) as work:
         with screen.stage("Reading the records"):
             raw = reading.raw(files) if table is None else records_of(screen, table)
         sound, found = reading.checked(screen, raw, refuse=True)
@@ -165,7 +166,7 @@ class Fits(NamedTuple):
         held, fitted = (runs.where(lambda run, yes=yes: (run in held_out.runs) == yes) for yes in (True, False))
         fits = fit_laws(screen, self.names, fitted, held, **self.options)
         show(screen, fits)
-        validation = self.validated(fits.comparison.best.name, fitted) if self.cross_validate else None
+        validation = self.validated(fits.comparison.best, fitted) if self.cross_validate else None
         following = f" and the fits of {', '.join(later)}" if later else ""
         with self.work.saving("Laws and tables", fits.missing + following) as draft:
             (draft / name).mkdir(exist_ok=True)
@@ -176,12 +177,12 @@ class Fits(NamedTuple):
         if later:
             self.work.results.publish(f"the fits of {', '.join(later)}")
 
-    def validated(self, name: str, runs: BenchSet) -> CrossValidation | None:
-        """Each record predicted by the law of this name fitted to the others; None where that fails."""
-        screen, rig = self.work.screen, self.options["rig"]
+    def validated(self, best: Rung, runs: BenchSet) -> CrossValidation | None:
+        """Each record predicted by this law fitted to the others; None where that fails."""
+        screen, name, rig = self.work.screen, best.name, self.options["rig"]
         with self.work.attempts.part(f"The cross-validation of {name}"), screen.stage("Leaving out each record"):
-            start = identify.default_ladder(tuple(runs), [name], rig=rig)
-            validation = identify.cross_validate(start, tuple(runs), rig=rig)
+            named = {name: best.result.law} if best.reduced else identify.default_ladder(tuple(runs), [name], rig=rig)
+            validation = identify.cross_validate(named, tuple(runs), rig=rig, freeze=best.held)
             screen.table(validation.record_table())
             return validation
         return None
@@ -214,13 +215,14 @@ def fit_laws(
     apart = [] if keep_bad else bench.contradictions(tuple(runs), same_command=options.get("scheduled", False))
     if apart:
         words = " ".join(bench.contradictions_in_words(apart))
-        raise ValueError(in_command_line(f"{words} With --keep-bad, they are fitted together."))
+        raise ValueError(f"{words} With --keep-bad, they are fitted together.")
     names = names or identify.suited_laws(runs)
     title = f"Fitting {len(names)} law{'s' * (len(names) > 1)} to {len(runs)} record{'s' * (len(runs) > 1)}"
     outcomes: list[Rung | Failure] = []
     with screen.stage(title, total=len(names)) as advance:
         try:
             starts = identify.default_ladder(tuple(runs), names, rig=rig)
+            options["bounds"] = bounds_in_si(options.get("bounds") or {}, [{"law": law} for law in starts.values()])
             for outcome in identify.fit_each(
                 starts,
                 tuple(runs),
@@ -261,7 +263,7 @@ def show(screen: Screen, fits: Fitted) -> None:
     if several and best.doubt and further:
         screen.points([f"--law all tries {further} further laws"])
     warnings = best.result.warnings if screen.verbose else best.result.main_warnings
-    screen.remarks([*map(in_command_line, warnings), *comparison.verdict[lines:]], style="yellow")
+    screen.remarks([*warnings, *comparison.verdict[lines:]], style="yellow")
 
 
 def write_fits(folder: Path, comparison: Comparison, runs: BenchSet, attempts: Attempts) -> None:

@@ -106,20 +106,21 @@ def undisturbed() -> Iterator[None]:
 def watched(then: Any = signal.default_int_handler) -> Iterator[None]:
     """Take over Ctrl-C and SIGTERM while this lasts.
 
-    Nothing changes where a command is called from a program that handles Ctrl-C itself or ignores it, from another
-    thread than the first, or from a command; and with SIGTERM, where the program handles or ignores that.
+    Nothing changes where a command is called from a program that handles Ctrl-C itself, from another thread than the
+    first, or from a command; a signal that is ignored, as Ctrl-C is by what a shell script starts with `&`, stays so.
 
     Arguments:
         then: what answers Ctrl-C afterwards.
     """
     first = threading.current_thread() is threading.main_thread()
-    if not first or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+    ours = [number for number, default in SIGNALS.items() if signal.getsignal(number) is default]
+    ours *= signal.getsignal(signal.SIGINT) in (signal.default_int_handler, signal.SIG_IGN)
+    if not first or not ours:
         yield
         return
     _watch.asked = _watch.worth_keeping = _watch.saving = False
     ears, mouth = socket.socketpair()
     mouth.setblocking(False)
-    ours = [number for number, default in SIGNALS.items() if signal.getsignal(number) is default]
     for number in ours:
         signal.signal(number, lambda number, frame: None)  # the thread answers, at once and not between bytecodes
     before = signal.set_wakeup_fd(mouth.fileno(), warn_on_full_buffer=False)

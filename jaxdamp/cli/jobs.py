@@ -1,6 +1,7 @@
 """What the commands share between their start and their end: where they write, pictures, warnings of rides."""
 
 import contextlib
+import shutil
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -11,8 +12,8 @@ from jaxdamp._tables import Table
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.application import command_line
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.results import Results, another_page, results_folder
-from jaxdamp.cli.wording import in_command_line, message
+from jaxdamp.cli.results import Results, results_folder
+from jaxdamp.cli.wording import message
 from jaxdamp.dampers import OutsideFittedRangeWarning
 from jaxdamp.report import Attempts, Report
 from jaxdamp.simulation import CoarseStepWarning, Response
@@ -81,7 +82,9 @@ class Job(NamedTuple):
 
 
 @contextlib.contextmanager
-def job(screen: Screen, command: str, output: Output, page: Path | None = None) -> Iterator[Job]:
+def job(
+    screen: Screen, command: str, output: Output, page: Path | None = None, *, resume: bool = False
+) -> Iterator[Job]:
     """The results of a command; at the end the terminal says what was written and what could not be made.
 
     Arguments:
@@ -89,13 +92,36 @@ def job(screen: Screen, command: str, output: Output, page: Path | None = None) 
         command: its name.
         output: the folder to write.
         page: another place for the page.
+        resume: go on with what an interrupted run had finished.
     """
     target, screen.verbose = output.out or Path(f"jaxdamp-{command}"), output.verbose
-    attempts, replace = Attempts(interrupt.check, message, in_command_line), output.replace
-    with another_page(page, target, replace=replace), results_folder(target, command, replace=replace) as results:
+    attempts = Attempts(interrupt.check, message)
+    folder = results_folder(target, command, replace=output.replace, resume=resume)
+    with another_page(page, target, replace=output.replace or resume), folder as results:
         yield Job(screen, results, attempts)
     screen.files(target, results.published)
     screen.points(attempts.troubles, style="yellow")
+
+
+@contextlib.contextmanager
+def another_page(page: Path | None, target: Path, *, replace: bool = False) -> Iterator[None]:
+    """A copy of the report of a results folder in another place, written when all is done.
+
+    Arguments:
+        page: the file to write; None for no copy.
+        target: the results folder.
+        replace: replace a file that is there.
+
+    Raises:
+        ValueError: the file is there already, or is a folder.
+    """
+    if page is not None and (page.is_dir() or (page.exists() and not replace)):
+        what = "is a folder: name a file" if page.is_dir() else "is there already: name another file"
+        raise ValueError(f"{str(page)!r} {what} with --report{', or pass --replace' * page.is_file()}.")
+    yield
+    if page is not None:
+        page.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(target.expanduser() / "report.html", page)
 
 
 def write_tables(folder: Path, tables: Mapping[str, Table]) -> None:
@@ -114,14 +140,14 @@ def without_range_warnings() -> Iterator[None]:
 
 
 def with_step_warnings(drive: Callable[[], Response]) -> tuple[Response, list[str]]:
-    """A run, and what it warns of its step in the words of the command line; other warnings pass."""
+    """A run, and what it warns of its step; other warnings pass."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", CoarseStepWarning)
         response = drive()
     texts = []
     for warning in caught:
         if issubclass(warning.category, CoarseStepWarning):
-            texts.append(in_command_line(str(warning.message)))
+            texts.append(str(warning.message))
         else:
             warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
     return response, texts

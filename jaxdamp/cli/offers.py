@@ -42,6 +42,7 @@ NOT_OFFERED = {  # arguments of library functions, and why
     },
     "sweeps.sweep": {
         "cluster": "an object of Python",
+        "file": "what is finished is kept for --resume",
         "gradients": "for programs",
         "progress": "shown at the terminal",
     },
@@ -52,7 +53,6 @@ NAMES = {  # of options that differ from the argument, by function or for all; t
     "bounds": "bound",
     "tune.minimise limits": "limit",
     "sensors": "sensor",
-    "sweeps.sweep file": "resume",
     "low_pass": "filter",
     "reversed_channels": "reversed",
     "identify.fit_vehicle start": "initial_motion",
@@ -79,16 +79,17 @@ class Written(NamedTuple):
     repeated: bool = True
 
 
+ENDS = "be a number, or two as LOWER:UPPER, each with its unit or both in SI"
 SPANS = words.named(words.span, "be a number, or two as LOWER:UPPER")
 SENSOR = {"gain": 1.0, "offset": 0.0, "lag": 0.0, "delay": 0.0, "high_pass": None}
 GUIDE: dict[str, float | None] = dict.fromkeys(("friction", "stiffness", "damping", "friction_velocity", "ahead"))
 
 WRITTEN = {  # by the name of the option, where its type does not say it
-    "bound": Written(SPANS, "NAME=LOWER:UPPER", "rate=1000:4000"),
+    "bound": Written(words.named(words.bound, ENDS), "NAME=LOWER:UPPER", "rate=1000:4000, rate=5lbf s/in:25lbf s/in"),
     "limit": Written(
-        words.named(words.limit, "be a number, or two as LOWER:UPPER"),
+        words.named(words.limit, ENDS),
         "NAME=LIMIT",
-        "travel=0.1,grip=+10%,comfort=none, or NAME=LOWER:UPPER",
+        "travel=0.1,grip=+10%,comfort=none, travel=4in, or NAME=LOWER:UPPER",
     ),
     "priors": Written(SPANS, "NAME=MEAN:DEVIATION"),
     "columns": Written(words.named(words.column, like="stroke=..."), "NAME=COLUMN", "time=t_s,stroke=1,velocity=none"),
@@ -140,8 +141,9 @@ TEXTS = {  # help where the docstring speaks of Python only, by option, or by co
     'the first cycle), "rest", "periodic" or "estimated".',
     "starts": "Number of searches, from several starts; the best end is the result.",
     "tie": "Parameters that take the values of others, such as front.damper.*=rear.damper.*.",
-    "limit": "Hard limits by metric, in its SI unit or relative to the start; comfort, travel and grip are metrics.",
-    "resume": "File that keeps finished points, so that the same sweep, stopped or killed, goes on where it was.",
+    "limit": "Hard limits by metric, in its SI unit, in one that is named, or relative to the start; comfort, travel "
+    "and grip are metrics.",
+    "resume": "Go on where the same command was stopped, killed or switched off: what it had finished is taken up.",
     "seed": "Of random roads, noise and further starts.",
     "priors": "What is known of parameters beforehand: mean and standard deviation.",
     "substeps": "Steps of the simulation between two instants; as many as the laws need if left out.",
@@ -149,9 +151,10 @@ TEXTS = {  # help where the docstring speaks of Python only, by option, or by co
     "fit over": "Parameters to fit, by path, last part or pattern; all if left out.",
     "fit-vehicle over": "Parameters of the vehicle to fit, by path, last part or pattern; all if left out.",
     "sweep over": "Axes: damper.rate=1000:8000:15 are 15 values, sprung_mass=1000;1200 two.",
-    "bound": "Limits of parameters, in their SI units.",
-    "tune bound": "Bounds of parameters, in their SI units; a third to three times the start if left out.",
+    "bound": "Limits of parameters, in their SI unit or in one that is named.",
+    "tune bound": "Bounds of parameters, in their SI unit or in one that is named; a third to three times the start if "
+    "left out.",
     "rig": "What the test machine adds to the force, fitted with the law: offset, gas, gas_stiffness, friction, mass, "
-    "delay, lag, stroke_offset, heat; none for nothing.",
+    "delay, lag, command_lag, stroke_offset, heat; none for nothing.",
     "initial_motion": '"rest": records begin at rest on their first heights; "free": their motion is fitted.',
 }

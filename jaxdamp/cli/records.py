@@ -11,7 +11,7 @@ from jaxdamp._checks import Setting
 from jaxdamp.bench import BenchRun, BenchSet, ForceVelocityTable, Preflight, by_number, settings_apart
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.options import Call
-from jaxdamp.cli.wording import in_command_line, in_options
+from jaxdamp.cli.wording import in_options
 from jaxdamp.cli.words import words
 
 
@@ -96,11 +96,11 @@ class Reading:
         sound = BenchSet((run for run in runs if run.name not in wrong), runs.left_out)
         keeping = "With --keep-bad, they are used as they are."
         if not len(sound):
-            raise ValueError(" ".join([*(in_command_line(f"{finding}") for finding in found.of("error")), keeping]))
+            raise ValueError(" ".join([*(finding.sentence for finding in found.of("error")), keeping]))
         names = ", ".join(sorted(wrong))
         if wrong and refuse and not self.read.given.get("skip_bad"):
-            first = in_command_line(f"{found.of('error')[0]}")
-            raise ValueError(f"{first} With --skip-bad, records with an error are left out: {names}. {keeping}")
+            skipping = f"With --skip-bad, records with an error are left out: {names}."
+            raise ValueError(f"{found.of('error')[0].sentence} {skipping} {keeping}")
         if wrong:
             screen.points([f"left out, with an error: {names}"], style="red")
         return sound, found
@@ -111,7 +111,7 @@ class Reading:
         sentences = found.sentences()
         shown = sentences if screen.verbose else [text for text in sentences if not text.startswith("note")][:_LINES]
         for sentence in shown:
-            screen.points([in_command_line(sentence)], style=_COLOURS[sentence.split(",")[0]])
+            screen.points([sentence], style=_COLOURS[sentence.split(",")[0]])
         if len(sentences) > len(shown):
             kinds = dict.fromkeys(finding.name for finding in found.findings)
             more = [kind for kind in kinds if not any(kind in text.split(":")[0] for text in shown)]
@@ -217,4 +217,4 @@ def grouped(runs: BenchSet, name: str | None) -> tuple[dict[str, BenchSet], str]
     if len(set(folders.values())) < len(folders):
         _checks.refuse("group_by", "give a folder to each value", ", ".join(folders), "Name the values otherwise.")
     parts = zip(folders.values(), groups.values(), strict=True)
-    return {folder: BenchSet(part) for folder, part in parts}, in_command_line(sentence)
+    return {folder: BenchSet(part) for folder, part in parts}, sentence

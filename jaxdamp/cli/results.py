@@ -17,7 +17,7 @@ import typer
 from filelock import FileLock, Timeout
 
 from jaxdamp._writing import sync, write_whole
-from jaxdamp.cli import interrupt
+from jaxdamp.cli import interrupt, resuming
 from jaxdamp.cli.interrupt import Interrupted
 
 
@@ -26,6 +26,7 @@ UNFINISHED = "UNFINISHED.txt"
 PREVIOUS = ".previous"
 FORMAT = "jaxdamp results"
 DRAFT = ".draft"
+FULL = {errno.ENOSPC, errno.EDQUOT}
 
 
 class Results:
@@ -37,10 +38,10 @@ class Results:
         missing: what was still to come at the last `publish`, in words.
     """
 
-    def __init__(self, target: Path, command: str, earlier: list[str]) -> None:
+    def __init__(self, target: Path, command: str, earlier: list[str], *, begun: bool = False) -> None:
         self.target, self._command, self._earlier = target, command, earlier
         self._published: dict[str, str] = {}  # hashes by file
-        self._begun = False
+        self._begun = begun  # what is in the folder is of this very run
         self.missing = "everything"
         self.draft = self._new_draft()
 
@@ -114,8 +115,8 @@ class Results:
     def _tell(self, folder: Path, missing: str, besides: list[str] | None = None) -> None:
         """Write the manifest, and first the note on what is missing."""
         if missing:
-            text = f"These results of jaxdamp {self._command} are not complete. Missing: {missing}.\n"
-            write_whole(folder / UNFINISHED, text)
+            text = f"These results of jaxdamp {self._command} are not complete. Missing: {missing}."
+            write_whole(folder / UNFINISHED, f"{text} {resuming.offer(self.target)}".rstrip() + "\n")
         files = [*sorted({*self.published, *(besides or [])}), *([UNFINISHED] if missing else []), MANIFEST]
         manifest = {
             "format": FORMAT,
@@ -129,13 +130,12 @@ class Results:
     def discard(self) -> str:
         """Remove the draft, and say what is in place."""
         shutil.rmtree(self.draft, ignore_errors=True)
-        if not self.published:
-            return ""
-        return f"{str(self.target)!r} holds what was finished before. Not written: {self.missing}."
+        there = f"{str(self.target)!r} holds what was finished before. Not written: {self.missing}."
+        return f"{there if self.published else 'Nothing was written.'} {resuming.offer(self.target)}".rstrip()
 
 
 @contextmanager
-def results_folder(target: Path, command: str, *, replace: bool = False) -> Iterator[Results]:
+def results_folder(target: Path, command: str, *, replace: bool = False, resume: bool = False) -> Iterator[Results]:
     """Results to write; they are in place when all is done, or from the first `publish` on.
 
     The target must not exist, or be empty. With `replace`, what the same command wrote there before, and any file that
@@ -146,6 +146,7 @@ def results_folder(target: Path, command: str, *, replace: bool = False) -> Iter
         target: the folder to write.
         command: name of the command, for the manifest.
         replace: write into a folder that is not empty.
+        resume: go on with a run of which finished pieces are kept.
 
     Raises:
         ValueError: the target is a file, is not empty, holds the results of another command, is being written by
@@ -153,8 +154,8 @@ def results_folder(target: Path, command: str, *, replace: bool = False) -> Iter
         Interrupted: Ctrl-C, with words on what was written. What is finished is in place then.
     """
     target = target.expanduser()
-    with _only_writer(target):
-        yield from _written(_opened(target, command, replace))
+    with _only_writer(target), resuming.keeping(target, resume=resume):
+        yield from _written(_opened(target, command, replace, resume and _resumed(target, command)))
 
 
 @contextmanager
@@ -184,6 +185,8 @@ def _written(results: Results) -> Iterator[Results]:
     except Interrupted as stop:
         raise Interrupted(_kept(results)) from stop
     except OSError as error:
+        if error.filename is None and error.errno in FULL:  # raised by a write into a file that is open
+            raise _unwritable(target, error) from error
         if error.filename is None or not str(error.filename).startswith(str(results.draft)):
             raise
         place = target / Path(error.filename).relative_to(results.draft)
@@ -192,39 +195,39 @@ def _written(results: Results) -> Iterator[Results]:
         shutil.rmtree(results.draft, ignore_errors=True)
 
 
-def refuse_target(target: Path, command: str, *, replace: bool) -> None:
+def refuse_target(target: Path, command: str, *, replace: bool, resume: bool = False) -> None:
     """Refuse a folder that the command may not write.
 
     Raises:
         ValueError: as `results_folder`.
     """
-    _earlier_files(target.expanduser(), command, replace)
+    target = target.expanduser()
+    if not (resume and _resumed(target, command)):
+        _earlier_files(target, command, replace)
 
 
-@contextmanager
-def another_page(page: Path | None, target: Path, *, replace: bool = False) -> Iterator[None]:
-    """A copy of the report of a results folder in another place, written when all is done.
-
-    Arguments:
-        page: the file to write; None for no copy.
-        target: the results folder.
-        replace: replace a file that is there.
+def _resumed(target: Path, command: str) -> bool:
+    """Whether the folder holds what an interrupted run wrote that can be resumed.
 
     Raises:
-        ValueError: the file is there already, or is a folder.
+        ValueError: a file of it was changed since.
     """
-    if page is not None and (page.is_dir() or (page.exists() and not replace)):
-        what = "is a folder: name a file" if page.is_dir() else "is there already: name another file"
-        raise ValueError(f"{str(page)!r} {what} with --report{', or pass --replace' * page.is_file()}.")
-    yield
-    if page is not None:
-        page.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(target.expanduser() / "report.html", page)
+    manifest = _manifest(target) if resuming.kept(target) else {}
+    if manifest.get("command") != command or manifest.get("complete"):
+        return False
+    hashes = manifest.get("sha256", {})
+    changed = [name for name, was in hashes.items() if (target / name).is_file() and _sha256(target / name) != was]
+    if changed:
+        raise ValueError(
+            f"{str(target / changed[0])!r} was changed since the run was interrupted, and --resume would replace it: "
+            "move it to another folder."
+        )
+    return True
 
 
-def _opened(target: Path, command: str, replace: bool) -> Results:
+def _opened(target: Path, command: str, replace: bool, resumed: bool) -> Results:
     """The results of a folder that may be written."""
-    earlier = _earlier_files(target, command, replace)
+    earlier = [] if resumed else _earlier_files(target, command, replace)
     for draft in sorted(target.parent.glob(f".{glob.escape(target.name)}.*{DRAFT}")):
         text = f"{str(draft)!r} was left by a run that was killed: look into it for results, or delete it."
         typer.echo(text, err=True)
@@ -232,7 +235,7 @@ def _opened(target: Path, command: str, replace: bool) -> Results:
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.exists() and not os.access(target, os.W_OK | os.X_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-        return Results(target, command, earlier)
+        return Results(target, command, earlier, begun=resumed)
     except OSError as error:
         raise _unwritable(target, error) from error
 
@@ -245,14 +248,15 @@ def _kept(results: Results) -> str:
     """Put what is finished into place after an interruption, and say so."""
     if written(results.draft):
         results.publish(results.missing)
+    offer = resuming.offer(results.target)
     if not results.published:
-        return "Interrupted. Nothing was written."
+        return f"Interrupted. Nothing was written. {offer}".rstrip()
     names = results.published
     shown = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
     return (
         f"Interrupted. {str(results.target)!r} holds what was finished: {shown}. Not written: {results.missing}, as "
-        f"{UNFINISHED} in it says too."
-    )
+        f"{UNFINISHED} in it says too. {offer}"
+    ).rstrip()
 
 
 def written(folder: Path) -> list[str]:

@@ -5,15 +5,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from jaxdamp import _checks, export, roads, simulate
+import numpy as np
+
+from jaxdamp import _checks, export, plots, roads, simulate
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.controlling import Controlling
 from jaxdamp.cli.early import refuse_road
 from jaxdamp.cli.jobs import Output, job, with_step_warnings, without_range_warnings, write_tables
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law
-from jaxdamp.cli.wording import in_command_line
 from jaxdamp.dampers import AbstractDamper
+from jaxdamp.parameters import match_paths, parameters
 from jaxdamp.report import Table, axles_sentence, notes_of, ride_report, ride_tables, ride_verdict
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import Response
@@ -24,6 +26,15 @@ USUAL = 10.0  # s, a ride on a road without an end of its own
 FASTEST = 70.0  # m/s, 252 km/h
 HIGHEST_BUMP = 0.3  # m
 LONGEST_BUMP = 50.0  # m
+USUAL_SIZES = {  # of parameters of dampers and road vehicles, by unit: the least that is not zero, and the largest
+    "kg": (0.1, 1e5),
+    "N s/m": (0.0, 1e6),
+    "N/m": (0.0, 1e9),
+    "N": (0.0, 1e6),
+    "m": (0.0, 100.0),
+    "m/s": (0.0, 100.0),
+    "s": (0.0, 100.0),
+}
 
 
 @dataclass(frozen=True)
@@ -96,6 +107,29 @@ def unusual(road: str, speed: float) -> list[str]:
     return notes
 
 
+def beyond_vehicles(car: AbstractVehicle, over: Mapping[str, np.ndarray]) -> list[str]:
+    """Sentences on values of an axis that no damper or road vehicle has, as where another unit was meant.
+
+    >>> from jaxdamp import vehicles
+    >>> beyond_vehicles(vehicles.presets.quarter_car_000(), {"damper.rate": np.array([1500.0, 1e300])})
+    ['unusual: 1 of 2 values of damper.rate is beyond what vehicles have (up to 1e+06 N s/m), such as 1e+300.']
+    """
+    units, notes = {p.path: p.unit for p in parameters(car)}, []
+    for name, values in over.items():
+        unit = units[match_paths([*units], [name])[0]]
+        least, most = USUAL_SIZES.get(unit, (0.0, np.inf))
+        size = np.abs(values)
+        beyond = values[(size > most) | ((size > 0.0) & (size < least))]
+        if beyond.size:
+            reach = f"from {least:g} to {most:g} {unit}" if least else f"up to {most:g} {unit}"
+            verb = "is" if beyond.size == 1 else "are"
+            notes.append(
+                f"unusual: {beyond.size} of {values.size} values of {name} {verb} beyond what vehicles have ({reach}), "
+                f"such as {beyond[np.argmax(np.abs(np.log(np.abs(beyond))))]:g}."
+            )
+    return notes
+
+
 def ride(
     screen: Screen,
     law: Path,
@@ -136,7 +170,7 @@ def ride(
                 remarks += [f"{name}: {text}" for text in warned]
             tables = ride_tables(responses)
             latest_first = dict(reversed(responses.items()))
-            remarks += [in_command_line(note) for note in notes_of(latest_first)]
+            remarks += notes_of(latest_first)
         screen.answer(*ride_verdict(responses))
         screen.table(headline(screen, tables["metrics"], next(iter(responses.values())).vehicle))
         screen.details(*(table for name, table in tables.items() if name != "metrics"))
@@ -144,10 +178,11 @@ def ride(
         axles = axles_sentence(responses)
         if axles:
             screen.say(axles)
+        title = f"{vehicle} on {road} at {driving.speed:g} m/s"
         with work.saving("Tables and channels") as draft:
             _write(draft, laws, responses)
             write_tables(draft, tables)
-        title = f"{vehicle} on {road} at {driving.speed:g} m/s"
+            plots.animation(responses, draft / "animation.html", title=title)
         work.page(ride_report, responses, title=title, laws=laws, remarks=remarks)
 
 
@@ -164,5 +199,8 @@ def _write(folder: Path, laws: Mapping[str, AbstractDamper], responses: Mapping[
     """Laws and channels."""
     for name, law in laws.items():
         export.to_json(law, folder / f"{name}.json")
+    car = responses["law"].vehicle
+    if car.passive is not car:
+        export.to_json(car, folder / "vehicle.json")  # `jaxdamp export` makes C of its controller
     for name, response in responses.items():
         response.to_xarray().to_dataframe().to_csv(folder / f"channels_{name}.csv")

@@ -1,4 +1,4 @@
-"""Units and sign of what a command shows: from its options, or from `jaxdamp.toml` here or in ~/.config."""
+"""Units, sign and words of what a command shows: from its options, or from `jaxdamp.toml` here or in ~/.config."""
 
 import os
 from collections.abc import Iterator, Mapping
@@ -10,6 +10,7 @@ from jaxdamp import _checks
 from jaxdamp._display import Display, shown_in
 from jaxdamp._documents import read_toml
 from jaxdamp.cli.console import Screen
+from jaxdamp.cli.wording import in_command_line
 
 
 FILE, TABLE = "jaxdamp.toml", "show"
@@ -24,16 +25,13 @@ def chosen(given: Mapping[str, Any], screen: Screen) -> Iterator[None]:
         given: the options of a command by name.
         screen: where units and sign are said if they are not those of the library.
     """
-    if "show_units" not in given:
-        yield
-        return
-    stated = {key: given[f"show_{key}"] for key in KEYS if given[f"show_{key}"]}
+    stated = {key: given[f"show_{key}"] for key in KEYS if given.get(f"show_{key}")}
     sources = []
-    for file in _files(given.get("files") or ()):
+    for file in _files(given.get("files") or ()) if "show_units" in given else ():
         found = _stated(file)
         sources += [str(file)] if found.keys() - stated.keys() else []
         stated = {**found, **stated}
-    display = Display(**stated)
+    display = Display(**stated, wording=in_command_line)
     if display.described:
         where = f" (from {' and '.join(sources)})" if sources else ""
         screen.say(f"{display.described}{where}")

@@ -8,7 +8,6 @@ from jaxdamp import _checks, dampers, export, identify
 from jaxdamp.bench import BenchSet, ForceVelocityTable
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.jobs import Output, job, write_tables
-from jaxdamp.cli.wording import in_command_line
 from jaxdamp.cli.words import words
 from jaxdamp.report import table_report
 
@@ -51,7 +50,7 @@ def fit_table(
             _checks.refuse(option.name, "be left out with a force-velocity table", "given", "Or fit laws with --law.")
     with job(screen, "fit", output) as work:
         screen.table(table.table())
-        screen.points([in_command_line(note) for note in table.notes])
+        screen.points(table.notes)
         with work.saving("Laws and tables") as draft:
             best = _write_laws(draft, table, kind)
             write_tables(draft / "tables", {"forces": table.table()})

@@ -3,6 +3,7 @@
 import json
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,13 +11,16 @@ import numpy as np
 import typer
 
 from jaxdamp import Ride, _checks, export, sweep, tune
+from jaxdamp._pieces import kept_file
 from jaxdamp.cli.choosing import choose, settings_of
 from jaxdamp.cli.console import Screen
+from jaxdamp.cli.controlling import Controlling
 from jaxdamp.cli.jobs import Output, job, write_tables
+from jaxdamp.cli.limits import bounds_in_si, in_si
 from jaxdamp.cli.options import Call
-from jaxdamp.cli.riding import Driving, headline, unusual
+from jaxdamp.cli.riding import Driving, beyond_vehicles, headline, unusual
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, read_module, with_law, write_laws
-from jaxdamp.cli.wording import in_command_line
+from jaxdamp.control import Controlled
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.report import sweep_report, tuning_report
 from jaxdamp.roads import WhiteRoad
@@ -39,14 +43,18 @@ def tune_command(
     search: Annotated[Call, "tune.minimise"],
     roads: int = 1,
     driving: Driving,
+    controlling: Controlling,
     baseline: Path | None = None,
+    resume: bool = False,
     output: Output,
 ) -> None:
     """Tune the dampers of a vehicle for a ride metric within limits.
 
     Dampers whose law has settings, such as that of a manufacturer's sheet, are driven at each of them. Writes the law,
     the vehicle, tables, pictures and a page. Ends with exit code 1 if a limit is not met. Grip is
-    limited to +10% of the start by itself; --limit grip=none removes that.
+    limited to +10% of the start by itself; --limit grip=none removes that. With --controller the numbers of the
+    policy are tuned, or what --over names (policy.gain, actuator_lag, car.damper.laws.1.rate), and written as
+    controller.json, which --controller of ride takes.
 
     Arguments:
         road: iso:A to iso:H, white:A to white:H, bump:HEIGHT:LENGTH [m], or a file of position, height.
@@ -54,16 +62,20 @@ def tune_command(
         roads: realisations of an iso road, driven side by side; their mean counts.
         baseline: to compare with: another law, or another tuning's vehicle.json, as JSON.
     """
-    car = parse_vehicle(vehicle)(None if start is None else read_law("start", start))
+    law = None if start is None else read_law("start", start)
+    car = parse_vehicle(vehicle)(law)
     beside = None if baseline is None else _baseline(baseline, car)
     surfaces, run = _realisations(road, driving, roads)
-    if "over" not in search.given and settings_of(car):
-        _choose_setting(screen, car, minimise, surfaces, search, run, output)
+    if controlling.controller is not None:
+        car = controlling.of(car, law)
+        search = replace(search, given={"over": ["policy.**"], **search.given})
+    elif "over" not in search.given and settings_of(car):
+        _choose_setting(screen, car, minimise, surfaces, search, run, output, resume)
         return
     call, remarks = tuning_arguments(car, minimise, surfaces, search, driving.seed, run)
     screen.points(remarks)
     screen.points(unusual(road, driving.speed), style="yellow")
-    with job(screen, "tune", output) as work:
+    with job(screen, "tune", output, resume=resume) as work:
         result = tuned(screen, call)
         with work.saving("Law, vehicle and tables") as draft:
             write_tuning(draft, result)
@@ -79,12 +91,13 @@ def _choose_setting(
     search: Call,
     run: Mapping[str, Any],
     output: Output,
+    resume: bool,
 ) -> None:
     """Drive every setting of laws that depend on one, and write the best."""
     white = isinstance(surfaces[0], WhiteRoad)
     limits, remarks = _limits(car, metric, search, white=white)
     screen.points([*remarks, "Every setting of the law is driven; --over names parameters to tune instead."])
-    with job(screen, "tune", output) as work:
+    with job(screen, "tune", output, resume=resume) as work:
         chosen = choose(screen, car, metric, surfaces, limits, run, white=white)
         screen.table(chosen.table)
         screen.say(chosen.verdict, style="bold")
@@ -110,16 +123,18 @@ def tuning_arguments(
     """The arguments of `tune.minimise`, and what was chosen by default, in words."""
     limits, remarks = _limits(car, metric, search, white=isinstance(roads[0], WhiteRoad))
     road = roads[0] if len(roads) == 1 else tune.Scenarios(roads)
-    return search.arguments(metric=metric, vehicle=car, road=road, limits=limits, seed=seed, **run), remarks
+    bounds = bounds_in_si(search.given.get("bounds", {}), [car])
+    call = search.arguments(metric=metric, vehicle=car, road=road, limits=limits, bounds=bounds, seed=seed, **run)
+    return call, remarks
 
 
 def _limits(car: AbstractVehicle, metric: str, search: Call, *, white: bool) -> tuple[dict[str, Any], list[str]]:
     """The limits given, that of the grip by default, and a remark on it."""
-    limits, remarks = dict(search.given.get("limits", {})), []
+    limits, remarks = in_si(search.given.get("limits", {}), car, white=white)
     if not {"grip", *car.goal_metrics("grip", white=white)} & {*limits, metric}:
         limits["grip"] = GRIP
         sentence = f"Limited by default: grip (RMS variation of each tyre load) to {GRIP} of the start"
-        remarks = [f"{sentence}; --limit grip=none removes it."]
+        remarks.append(f"{sentence}; --limit grip=none removes it.")
     return {name: limit for name, limit in limits.items() if limit is not None}, remarks
 
 
@@ -131,7 +146,7 @@ def tuned(screen: Screen, call: Mapping[str, Any]) -> TuneResult[Any]:
     screen.say(result.summary.removeprefix(result.verdict.sentence).strip())
     screen.table(result.parameter_table())
     screen.table(headline(screen, result.table(), result.vehicle, {result.metric, *result.limits}))
-    screen.remarks([in_command_line(warning) for warning in result.warnings], style="yellow")
+    screen.remarks(result.warnings, style="yellow")
     return result
 
 
@@ -152,6 +167,8 @@ def write_tuning(folder: Path, result: TuneResult[Any]) -> None:
     """The tuned laws, the vehicle, tables, and all of it as JSON."""
     write_laws(folder, result.vehicle)
     export.to_json(result.vehicle, folder / "vehicle.json")
+    if isinstance(result.vehicle, Controlled) and not isinstance(result.vehicle.policy, dict):
+        export.to_json(result.vehicle.policy, folder / "controller.json")
     tables = {"parameters": result.parameter_table(), "metrics": result.table()}
     if result.scenarios is not None:
         tables["scenarios"] = result.scenario_table()
@@ -174,6 +191,7 @@ def sweep_command(
     driving: Driving,
     how: Annotated[Call, "sweeps.sweep"],
     baseline: Path | None = None,
+    resume: bool = False,
     output: Output,
 ) -> None:
     """Compute ride metrics over a grid of parameters: curves, maps and a table.
@@ -188,20 +206,22 @@ def sweep_command(
     car = parse_vehicle(vehicle)(None if start is None else read_law("start", start))
     (surface,), run = driving.over(road)
     white = isinstance(surface, WhiteRoad)
-    limits = _limits_by_metric(limit or {}, car, white=white)
+    stated, said = in_si(limit or {}, car, white=white)
+    limits = _limits_by_metric(stated, car, white=white)
     names = [name for word in metric for name in _metrics_of("metric", word, car, white=white)]
     names = list(dict.fromkeys([*names, *limits]))
     limit_spans(limits, names, dict.fromkeys(names, 1.0))  # refuses what is no limit before anything is driven
     beside = None if baseline is None else _baseline(baseline, car)
     ride = Ride(car, surface, metrics=names, **run)
     ride({name: values[0] for name, values in over.items() if not ride.out_of_domain({name: values[:1]})[0]})
+    screen.points(said)
     screen.points(unusual(road, driving.speed), style="yellow")
-    with job(screen, "sweep", output) as work:
+    with job(screen, "sweep", output, resume=resume) as work:
         with screen.stage("Driving") as advance, warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             shown = {"progress": lambda done, total: advance(f"{done} of {total} points", done)}
-            data = sweep(ride, over, **how.arguments(**shown))
-        remarks = [str(warning.message) for warning in caught]
+            data = sweep(ride, over, **how.arguments(file=kept_file("sweep.nc"), **shown))
+        remarks = beyond_vehicles(car, over) + [str(warning.message) for warning in caught]
         screen.table(data.jaxdamp.table())
         remarks += stationary_notes(ride.vehicle, surface) if isinstance(surface, WhiteRoad) else []
         remarks += [f"No effect on {name}: {', '.join(flat)}." for name, flat in without_effect(data).items()]

@@ -12,19 +12,20 @@ from jaxdamp import _checks, bench, export, identify
 from jaxdamp.bench import BenchSet, RideRecord
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.jobs import Output, job, write_tables
+from jaxdamp.cli.limits import bounds_in_si
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.records import decisions
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, write_laws
-from jaxdamp.cli.wording import in_command_line
 from jaxdamp.dampers import CoulombFriction
-from jaxdamp.identify import VehicleFit
-from jaxdamp.report import ride_records_table, vehicle_fit_report
+from jaxdamp.identify import Failure, VehicleComparison, VehicleFit, VehicleRung
+from jaxdamp.report import ride_records_table, vehicle_comparison_report, vehicle_fit_report
 from jaxdamp.rig import Sensor
 from jaxdamp.tune import damper_paths
 from jaxdamp.vehicles import AbstractVehicle, Guide, Guided
 
 
 FRICTION_VELOCITY = 0.01  # m/s, over which the friction of a guide changes its sign, unless it is stated
+Options = dict[str, Any]  # further arguments of `fit_vehicle`
 Named = tuple[str, dict[str, float]]  # an owner and its numbers, as in stroke:offset,delay=0.001
 
 
@@ -37,6 +38,7 @@ def fit_vehicle(
     reading: Annotated[Call, "bench.read_rides"],
     how: Annotated[Call, "identify.fit_vehicle"],
     guide: Sequence[Named] = (),
+    friction: Sequence[str] = (),
     report: Path | None = None,
     output: Output,
 ) -> None:
@@ -49,7 +51,10 @@ def fit_vehicle(
         files: files with records of its motion, patterns, or folders.
         guide: what holds a body to the ground, fitted from these starts: friction [N], stiffness [N/m], damping
             [N s/m]; friction_velocity [m/s] and ahead [m] are held.
+        friction: forms of friction to compare at guides, suspensions or, without any, beside the dampers: none,
+            coulomb, dahl (gives before it slides), or all. Drives are left out in turn, and one form is recommended.
     """
+    forms = friction_forms(friction)
     car = parse_vehicle(vehicle)(None if start is None else read_law("start", start))
     _checks.one_of("initial_motion", how.given.get("start", "rest"), ("rest", "free"))
     with job(screen, "fit-vehicle", output, report) as work:
@@ -61,15 +66,51 @@ def fit_vehicle(
         screen.table(ride_records_table(rides))
         screen.points(remarks)
         guided, call = fit_arguments(car, rides, benches, how, guide)
-        with screen.stage("Fitting"):
-            result = identify.fit_vehicle(guided, rides, **call)
+        comparison = _compared(screen, guided, forms, rides, call) if forms else None
+        result = comparison.best.result if comparison else _fitted(screen, guided, rides, call)
         for table in (result.scores_table(), result.table()):
             screen.table(table)
         screen.points([result.patterns] * bool(result.patterns))
-        screen.remarks([in_command_line(warning) for warning in result.warnings], style="yellow")
+        screen.remarks(result.warnings, style="yellow")
         with work.saving("Vehicle and tables") as draft:
             _write(draft, result)
-        work.page(vehicle_fit_report, result, remarks=remarks)
+            if comparison:
+                _write_comparison(draft, comparison)
+        page, content = (vehicle_comparison_report, comparison) if comparison else (vehicle_fit_report, result)
+        work.page(page, content, remarks=remarks)
+
+
+def friction_forms(words: Sequence[str]) -> tuple[str, ...]:
+    """The forms of friction that words name; all of them for "all"."""
+    for word in words:
+        _checks.one_of("friction", word, (*identify.FORMS, "all"))
+    return identify.FORMS if "all" in words else tuple(dict.fromkeys(words))
+
+
+def _fitted(screen: Screen, car: AbstractVehicle, rides: Sequence[RideRecord], call: Mapping[str, Any]) -> VehicleFit:
+    with screen.stage("Fitting"):
+        return identify.fit_vehicle(car, rides, **call)
+
+
+def _compared(
+    screen: Screen, car: AbstractVehicle, forms: Sequence[str], rides: Sequence[RideRecord], call: Options
+) -> VehicleComparison:
+    """The vehicle with each form of friction, fitted and judged on drives left out; said at the terminal."""
+    ladder, call = identify.friction_ladder(car, forms), dict(call)
+    if "coulomb" in forms:
+        call["freeze"] = [*call.get("freeze", ()), "friction_velocity"]
+    if "dahl" in forms and isinstance(car, Guided) and call.get("over") is not None:
+        call["over"] = [*call["over"], "guides.*.law.stiffness"]
+    outcomes = list[VehicleRung | Failure]()
+    title = f"Fitting {len(forms)} vehicle{'s' * (len(forms) > 1)} to {len(rides)} drive{'s' * (len(rides) > 1)}"
+    with screen.stage(title, total=len(forms)) as advance:
+        fits = identify.fit_each_vehicle(ladder, rides, progress=lambda name: advance(name, len(outcomes)), **call)
+        outcomes.extend(fits)
+    comparison = VehicleComparison.of(outcomes)
+    screen.answer(*comparison.verdict)
+    screen.table(comparison.table(), mark=comparison.best.name)
+    screen.points([f"{failure.name} could not be fitted. {failure.reason}" for failure in comparison.failed])
+    return comparison
 
 
 def fit_arguments(
@@ -78,9 +119,10 @@ def fit_arguments(
     benches: Mapping[str, BenchSet],
     how: Call,
     guide: Sequence[Named],
-) -> tuple[AbstractVehicle, dict[str, Any]]:
+) -> tuple[AbstractVehicle, Options]:
     """The vehicle with its guides, and the further arguments of `fit_vehicle`."""
-    given, paths, more = how.given, dict(benches), dict[str, Any]()
+    given, paths = how.given, dict(benches)
+    more: Options = {}
     guides = [guide_words(body, numbers, car) for body, numbers in guide]
     if guides:
         own = [f"guides.{i}.{name}" for i, (_, free) in enumerate(guides) for name in free]
@@ -91,7 +133,8 @@ def fit_arguments(
         paths = {f"car.{path}": runs for path, runs in benches.items()}
     more["sensors"] = sensor_words(given.get("sensors", ()), rides)
     machine = identify.machine_names("rig", given.get("rig", ())) or None
-    return car, how.arguments(**more, bench=paths, rig=machine)
+    bounds = bounds_in_si(given.get("bounds", {}), [car])
+    return car, how.arguments(**more, bench=paths, rig=machine, bounds=bounds)
 
 
 def sensor_words(given: Sequence[Named], rides: Sequence[RideRecord]) -> dict[str, Sensor]:
@@ -144,6 +187,16 @@ def _write(folder: Path, result: VehicleFit) -> None:
         _write_channels(folder / f"{record.name.replace('/', '_')}_fitted.csv", result, record)
     text = json.dumps(result.to_dict(), indent=1, ensure_ascii=False) + "\n"
     (folder / "fit.json").write_text(text, encoding="utf-8")
+
+
+def _write_comparison(folder: Path, comparison: VehicleComparison) -> None:
+    """The table of all vehicles, each as JSON, and all of their fits."""
+    write_tables(folder, {"ladder": comparison.table(), "left_out": comparison.best.scores_table()})
+    (folder / "vehicles").mkdir()
+    for rung in comparison.rungs:
+        export.to_json(rung.result.vehicle, folder / "vehicles" / f"{rung.name}.json")
+    text = json.dumps(comparison.to_dict(), indent=1, ensure_ascii=False) + "\n"
+    (folder / "comparison.json").write_text(text, encoding="utf-8")
 
 
 def _write_channels(file: Path, result: VehicleFit, record: RideRecord) -> None:

@@ -1,5 +1,6 @@
 """What the library says of Python's arguments, said of the options of the command line."""
 
+import ast
 import re
 import shlex
 from typing import Any
@@ -19,6 +20,8 @@ OTHER_WORDS = {
     "road_class": "CLASS in --road iso:CLASS",
     "skip_cycles": "Option --cycles",
     "start": "The beginning in --between",
+    "metric": "Option --minimise",
+    "metrics": "Option --metric",
 }
 CALLS = {
     r" It is in `result\.rig`, not in the law,": " It is in machines/, not in the law,",
@@ -26,12 +29,22 @@ CALLS = {
     r'add "(\w+)" or "(\w+)" to the machine \(`rig`\)': r"add --rig \1 or --rig \2",
     r'add "(\w+)" to the machine \(`rig`\)': r"add --rig \1",
     r"or a `Spring` to the law": "or fit a law with a spring",
+    r'`rig="(\w+)"`': r"--rig \1",
     r"or put the law into `Play`": "or fit --law besinger_play",
     r" \(`identify\.design_experiment` proposes tests\)": "",
+    r"Look at them with `data\.where[^`]*`, and at `data\.reason`": "sweep.csv has all points with the reasons",
+    r"`data\.failed` marks them, and `data\.reason` says why": "sweep.csv has the reasons",
+    r"Drive over (a random road instead: )?`roads\.iso8608\([^`]*`": "Take iso:CLASS",
+    r", or take an implicit solver, `engine=[^`]*`": "",
+    r"`read_rides\(\.\.\., reversed_channels=\[[^`]*`": "--reversed",
+    r"State it as held, `run\.held_at\(([^`]*)\)`": r"State it as held, --command NAME=\1",
+    r"Record the command as a channel, `BenchRun\.command_channel`": "Record the command, --columns command=...",
     r"Freeze all but one of them, or add": "Fit a simpler law, or add",
     r"Freeze it or add records that excite it": "Fit a simpler law, or add records that excite it",
     r"Add records beyond it, or freeze it": "Add records beyond it",
     r"Try another start, bounds, or fewer free parameters": "Fit a simpler law",
+    r"compare with `identify\.friction_ladder\(vehicle\)`": "compare the forms with --friction all",
+    r"(try|such as) piecewise_linear or table": r"\1 --law piecewise_linear,table",
     r"such as `Bilinear` or `PiecewiseLinear`": "such as --law bilinear,piecewise_linear",
     r"state what was set on the damper \(`command`\)": "state what was set on the damper (--command)",
     r"`process\(low_pass=([^)]*)\)`": r"--filter \1",
@@ -40,10 +53,8 @@ CALLS = {
     r"`process\(skip_cycles=[^)]*\)`": "--cycles skip:1",
     r"subtract it, `process\(without=[^`]*`": "fit it beside the law, --rig gas",
     r"`bounds=\{[^`]*`": "--bound",
-    r"`(dt|period|delay)=([^`]*)`": r"`--\1 \2`",
     r"Pass `tyre_lifts=True` to the vehicle": "Write tyre_lifts = true into a vehicle file, as for --vehicle car.toml,",
     r"`process\(delay=[^)]*\)`": "fit with --rig delay",
-    r'`units=\{"(\w+)": "(\w+)"\}`': r"--units \1=\2",
 }
 """Calls of Python in the sentences of the library, as patterns, and what the command line says instead."""
 
@@ -53,21 +64,28 @@ def option(argument: str) -> str:
     return f"--{argument.replace('_', '-')}"
 
 
-def option_text(setting: Setting) -> str:
+def option_text(setting: Setting, name: str = "") -> str:
     """An argument with its value as it is given on the command line.
+
+    Arguments:
+        setting: the argument.
+        name: of its option, if that is another one.
 
     >>> option_text(Setting("columns", {"time": None, "stroke": "x mm"}))
     "--columns 'time=none,stroke=x mm'"
     >>> option_text(Setting("sampling_rate")), option_text(Setting("stroke_from_velocity", True))
     ('--sampling-rate ...', '--stroke-from-velocity')
     """
+    name = name or option(setting.argument)
     if setting.value is True:
-        return option(setting.argument)
+        return name
     if isinstance(setting.value, dict):
         value = ",".join(f"{role}={_word(item)}" for role, item in setting.value.items())
+    elif isinstance(setting.value, list | tuple):
+        value = ",".join(map(_word, setting.value))
     else:
         value = _word(setting.value)
-    return f"{option(setting.argument)} {value if '...' in value else shlex.quote(value)}"
+    return f"{name} {value if '...' in value else shlex.quote(value)}"
 
 
 def _word(value: Any) -> str:
@@ -89,7 +107,26 @@ def in_command_line(text: str) -> str:
     """A sentence of the library that names calls and arguments of Python, with options instead."""
     for python, words in CALLS.items():
         text = re.sub(python, words, text)
+    text = re.sub(r"Argument `([^`]+)`", lambda found: _argument(found[1]), text)
+    text = re.sub(r"`(\w+)=([^`]*)`", lambda found: _setting(found) or found[0], text)
     return re.sub(r"`(\w+)`", lambda found: _word_of(found[1]), text)
+
+
+def _argument(argument: str) -> str:
+    """An argument at fault as the running command calls it; a parameter by its path."""
+    name, bracket, item = argument.partition("[")
+    words = own_words().get(name) or OTHER_WORDS.get(name) or (name if "." in name else f"Argument `{name}`")
+    return f"{words}{' of ' * bool(bracket)}{item.rstrip(']')}"
+
+
+def _setting(found: re.Match[str]) -> str:
+    """An argument with its value as the running command is given it; empty if it has no such option."""
+    words = own_words().get(found[1], "")
+    try:
+        value = ast.literal_eval(found[2])
+    except (SyntaxError, ValueError):
+        value = ...
+    return option_text(Setting(found[1], value), words.removeprefix("Option ")) if words.startswith("Option ") else ""
 
 
 def _word_of(argument: str) -> str:
@@ -99,10 +136,4 @@ def _word_of(argument: str) -> str:
 
 def message(error: Exception) -> str:
     """What an error says, in the language of the command line."""
-    if not isinstance(error, ArgumentError):
-        return in_command_line(str(error))
-    text, (name, bracket, item) = in_options(str(error), error.settings), error.argument.partition("[")
-    words = own_words().get(name) or OTHER_WORDS.get(name, "")
-    if words:
-        text = text.replace(f"Argument `{error.argument}`", f"{words}{' of ' * bool(bracket)}{item.rstrip(']')}")
-    return in_command_line(text)
+    return in_command_line(in_options(str(error), error.settings if isinstance(error, ArgumentError) else ()))

@@ -9,6 +9,8 @@ import numpy as np
 from jaxdamp import _checks
 
 
+Bound = float | str | None  # of a limit: a number, or a text that is relative or has a unit; None for no end
+Limit = Bound | tuple[Bound, Bound]
 Reader = Callable[[str, Any], Any]  # gives the value of an option, from its name and its text or texts
 
 
@@ -134,21 +136,56 @@ def span(text: str) -> tuple[float | None, float | None]:
     return (None, ends[0]) if len(ends) == 1 else (ends[0], ends[1])
 
 
-def limit(text: str) -> Any:
-    """A largest value, a range, or either relative to the start; None is no limit.
+_QUANTITY = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-zµ].*)")
 
-    >>> limit("0.1"), limit("-0.1:0.2"), limit("+10%"), limit("0.05:+20%"), limit("none")
-    (0.1, (-0.1, 0.2), '+10%', (0.05, '+20%'), None)
+
+def quantity(text: str) -> tuple[float, str] | None:
+    """The number and the unit of a text; None where it has no unit.
+
+    >>> quantity("500 lbf"), quantity("1e3"), quantity("+10%")
+    ((500.0, 'lbf'), None, None)
     """
-    parts = [part.strip() for part in text.split(":")]
+    match = _QUANTITY.fullmatch(text)
+    if match is None or re.fullmatch(r"[eE]\d+", match[2]):  # 1e3 is a number
+        return None
+    return float(match[1]), match[2]
+
+
+def limit(text: str) -> Limit:
+    """A largest value, a range, or either relative to the start or in a unit of its own; None is no limit.
+
+    >>> limit("0.1"), limit("-0.1:0.2"), limit("+10%"), limit("0.05:+20%"), limit("none"), limit("4in")
+    (0.1, (-0.1, 0.2), '+10%', (0.05, '+20%'), None, '4in')
+    """
     if text == "none":
         return None
-    if any(part.endswith("%") for part in parts) and len(parts) < 3:
-        ends = [part if part.endswith("%") else float(part) if part else None for part in parts]
-        lower, upper = (None, ends[0]) if len(ends) == 1 else ends
-    else:
+    parts = [part.strip() for part in text.split(":")]
+    with_unit = [quantity(part) is not None for part in parts]
+    if not any(with_unit) and not any(part.endswith("%") for part in parts):
         lower, upper = span(text)
+    else:
+        ends = [_end(part, unit) for part, unit in zip(parts, with_unit, strict=True)]
+        if len(ends) > 2 or (any(with_unit) and any(isinstance(end, float) for end in ends)):
+            raise ValueError(text)  # of 2:4in both may be meant in inches
+        lower, upper = (None, ends[0]) if len(ends) == 1 else ends
     return upper if lower is None else (lower, upper)
+
+
+def bound(text: str) -> tuple[Bound, Bound]:
+    """A range of a parameter, each end with its unit or both in SI.
+
+    >>> bound("1000:4000"), bound("5 lbf s/in:25 lbf s/in"), bound("3")
+    ((1000.0, 4000.0), ('5 lbf s/in', '25 lbf s/in'), (None, 3.0))
+    """
+    found = limit(text)
+    if found is None or "%" in text:
+        raise ValueError(text)
+    return found if isinstance(found, tuple) else (None, found)
+
+
+def _end(text: str, with_unit: bool) -> Bound:
+    """One end of a limit: a number, or a text that is relative or has a unit; None for no end."""
+    return text if with_unit or text.endswith("%") else float(text) if text else None
 
 
 def axis(text: str) -> np.ndarray:

@@ -35,14 +35,6 @@ def elementwise(writer: Writer, equation: Equation, operands: list[Atoms]) -> li
     return each(lambda *atoms: writer.define(operation, atoms, equation.dtype), equation, operands)
 
 
-def _unchanged(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
-    return operands
-
-
-def _square(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
-    return each(lambda a: writer.define("mul", (a, a), equation.dtype), equation, operands)
-
-
 def _integer_power(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
     exponent, dtype = equation.parameters["y"], equation.dtype
     one = constant(1, dtype)
@@ -143,8 +135,8 @@ def _round(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[At
 
 RULES: dict[str, Rule] = {
     **dict.fromkeys(SAME_NAME | set(OTHER_NAME), elementwise),
-    **dict.fromkeys(UNCHANGED, _unchanged),
-    "square": _square,
+    **dict.fromkeys(UNCHANGED, lambda writer, e, operands: operands),
+    "square": lambda writer, e, operands: each(lambda a: writer.define("mul", (a, a), e.dtype), e, operands),
     "integer_pow": _integer_power,
     "rsqrt": _reciprocal_root,
     "logistic": _logistic,

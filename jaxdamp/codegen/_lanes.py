@@ -38,29 +38,18 @@ WIDTH = 16  # of the printed block in the template
 
 @final
 class Operand(NamedTuple):
-    """An input of the body.
+    """An input of the body."""
 
-    Attributes:
-        shape: of one point.
-        value: where it is known while printing.
-        level: `OF_POINT`, `OF_STEP`, both or neither.
-    """
-
-    shape: tuple[int, ...]
-    level: int
-    value: np.ndarray | None = None
+    shape: tuple[int, ...]  # of one point
+    level: int  # `OF_POINT`, `OF_STEP`, both or neither
+    value: np.ndarray | None = None  # where it is known while printing
 
 
 class Loop(NamedTuple):
-    """A printed loop.
+    """A printed loop."""
 
-    Attributes:
-        parts: lines of C by what they depend on, and counts.
-        laned: which of the carried values differ from point to point.
-    """
-
-    parts: dict[str, str | list[str]]
-    laned: tuple[bool, ...]
+    parts: dict[str, str | list[str]]  # lines of C by what they depend on, and counts
+    laned: tuple[bool, ...]  # which of the carried values differ from point to point
 
     @property
     def text(self) -> str:

@@ -11,17 +11,11 @@ WORTH_KEEPING = 4  # operations, of which a store and a load of the next step ta
 
 
 class Kept(NamedTuple):
-    """A value of the body that the step before has computed already, at its end.
+    """A value of the body that the step before has computed already, at its end."""
 
-    Attributes:
-        target: its name in the body.
-        again: what it will be in the next step, computed in this one.
-        first: the statements that compute it before the first step.
-    """
-
-    target: Variable
-    again: Variable
-    first: list[Define]
+    target: Variable  # its name in the body
+    again: Variable  # what it will be in the next step, computed in this one
+    first: list[Define]  # the statements that compute it before the first step
 
 
 def kept_values(statements: Sequence[Define | Table], after: Mapping[str, Atom], results: Iterable[Atom]) -> list[Kept]:

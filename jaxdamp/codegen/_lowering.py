@@ -8,7 +8,7 @@ import numpy as np
 from jax.extend.core import Literal, Var
 from jaxtyping import Array, PyTree
 
-from jaxdamp.codegen import _arrays, _control, _elementwise, _indexing
+from jaxdamp.codegen import _arrays, _control, _elementwise
 from jaxdamp.codegen._jaxprs import Inner, equations, literal, opened, traced
 from jaxdamp.codegen._printing import printing
 from jaxdamp.codegen._program import Atoms, Constant, Statement, Variable, Writer, pruned
@@ -110,7 +110,7 @@ def evaluated(writer: Writer, inner: Inner, operands: list[Atoms]) -> list[Atoms
 
 
 def _rule(name: str) -> _elementwise.Rule:
-    rule = _elementwise.RULES.get(name) or _arrays.RULES.get(name) or _indexing.RULES.get(name)
+    rule = _elementwise.RULES.get(name) or _arrays.RULES.get(name)
     if rule is None:
         raise NotImplementedError(
             f"The primitive {name!r} of JAX cannot be printed. Write the function with others, such as "

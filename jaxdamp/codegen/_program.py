@@ -65,7 +65,12 @@ def simplified(operation: str, texts: Sequence[str]) -> int | None:
 
 @dataclass(frozen=True)
 class Variable:
-    """A scalar or an array of the program by its name in the printed text."""
+    """A scalar or an array of the program.
+
+    Attributes:
+        name: in the printed text.
+        dtype: its type.
+    """
 
     name: str
     dtype: str
@@ -157,15 +162,10 @@ Statement: TypeAlias = Define | Declare | Table | Assign | Leave | Loop | Branch
 
 @dataclass
 class Writer:
-    """Collects statements; an operation with the same operands is computed once in a block.
+    """Collects statements; an operation with the same operands is computed once in a block."""
 
-    Attributes:
-        statements: of the present block.
-        finite: whether all numbers are finite, so that a product with zero is zero.
-    """
-
-    finite: bool = False
-    statements: list[Statement] = field(default_factory=list)
+    finite: bool = False  # whether all numbers are finite, so that a product with zero is zero
+    statements: list[Statement] = field(default_factory=list)  # of the present block
     _known: list[dict[tuple, Variable]] = field(default_factory=lambda: [{}])
     _count: int = 0
 

@@ -56,17 +56,11 @@ def printed_scan(
 
 @dataclass(frozen=True)
 class _Scan:
-    """A loop over rows.
+    """A loop over rows."""
 
-    Attributes:
-        body: a step: constants, carry and row to carry.
-        values: of the constants; None of those that JAX traces.
-        arithmetic: refuse functions such as exponentials.
-    """
-
-    body: ClosedJaxpr
-    values: list[np.ndarray | None]
-    arithmetic: bool
+    body: ClosedJaxpr  # a step: constants, carry and row to carry
+    values: list[np.ndarray | None]  # of the constants; None of those that JAX traces
+    arithmetic: bool  # refuse functions such as exponentials
 
     def loop(self, laned: tuple[Lanes, Lanes], traced: list[Array], start: list[Array], rows: list[Array]) -> Loop:
         """The printed loop, where some arrays have one number for each point."""

@@ -1,7 +1,7 @@
 """A vehicle whose dampers are commanded while it drives."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import final
 
 import equinox as eqx
@@ -11,10 +11,14 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar
-from jaxdamp.control.loop import ControlLoop, forces_at, laws_at_levels, scheduled_in
+from jaxdamp.control.actuator import RateLimit
+from jaxdamp.control.levels import forces_at, laws_at_levels, scheduled_in
+from jaxdamp.control.loop import ControlLoop
 from jaxdamp.control.policies import AbstractPolicy
+from jaxdamp.control.sensors import Sensors
+from jaxdamp.control.together import AbstractVehiclePolicy, EachDamper
 from jaxdamp.parameters import nonnegative, parameter, positive, setting
-from jaxdamp.vehicles import AbstractVehicle, Channel, ChannelKind, Frame, Layout, LinearMap, System
+from jaxdamp.vehicles import AbstractVehicle, Channel, ChannelKind, Frame, Layout, LinearMap, System, matrix
 
 
 @final
@@ -25,9 +29,10 @@ class Controlled(AbstractVehicle):
     nearest, at the present motion and state of the law, is applied after `delay` and held, and the actuator follows it
     with a first-order lag:
 
-        u' = (u_target − u)/actuator_lag
+        u' = (u_target − u)/actuator_lag, within the `rate_limit`
 
     The sensors' filter is one of their own clock, the instants of the run: y += (1 − e^(−dt/sensor_lag)) (signal − y).
+    `sensors` gives signals a noise, a bias, a resolution and a lag of their own, or computes them from others.
 
     Between two levels of a `Scheduled` law its force is taken as straight in the command, which it is where the law is
     linear in its parameters or its forces are blended; else the force misses the demand a little. Demand and command
@@ -39,14 +44,17 @@ class Controlled(AbstractVehicle):
     with forces under the old command; then the policy decides; then forces are those of the new command. With fixed
     steps the run stays of third order through the jumps. Simulations, rides, sweeps and tunings take it as any
     vehicle; its parameters are those of the vehicle behind `car.`, and of the controller, such as `policy.gain`. What
-    needs a law without a memory of the controller refuses it: white roads, linearisation, `Adaptive`, export.
+    needs a law without a memory of the controller refuses it: white roads, linearisation, `Adaptive`. The controller
+    alone is exported as C and FMU by `export.to_c(car, "controller.c", part="controller")`.
 
     Arguments:
         car: any vehicle, with one or more dampers whose law is or holds a `Scheduled` law.
-        policy: of every such damper, each with its own states; or a mapping from the names of dampers
-            (`front_damper`) to policies, and those without one keep their commands.
+        policy: of every such damper, each with its own states; or of all together (`AbstractVehiclePolicy`); or a
+            mapping from the names of dampers (`front_damper`) to policies, and those without one keep their commands.
         period: between two samples [s], a whole number of steps of a run.
         delay: from a sample to its command [s], a whole number of steps.
+        sensors: of every damper, or a mapping from names of dampers; exact if left out.
+        rate_limit: of the actuators; none if left out.
 
     Raises:
         ValueError: no damper that takes a command, a name of no damper, a law whose force does not change at once with
@@ -64,12 +72,14 @@ class Controlled(AbstractVehicle):
     """
 
     car: AbstractVehicle
-    policy: AbstractPolicy | dict[str, AbstractPolicy]
+    policy: AbstractPolicy | AbstractVehiclePolicy | dict[str, AbstractPolicy]
     actuator_lag: Number = parameter("s", "time constant of the actuator", nonnegative, default=0.0, adjustable=False)
     sensor_lag: Number = parameter("s", "time constant of the sensors", nonnegative, default=0.0, adjustable=False)
     still: Number = setting("m/s", "velocity below which force over velocity is rounded", positive, default=0.1)
     period: float = eqx.field(static=True, default=5e-3)
     delay: float = eqx.field(static=True, default=0.0)
+    sensors: Sensors | dict[str, Sensors] | None = None
+    rate_limit: RateLimit | None = None
 
     def __check_init__(self) -> None:
         _checks.positive("period", self.period)
@@ -80,23 +90,34 @@ class Controlled(AbstractVehicle):
             remedy = "Make its damper `dampers.Scheduled((soft, hard), levels=[0.0, 1.0], command=0.0)`."
             must = "have a damper with one `Scheduled` law, which takes a command"
             _checks.refuse("car", must, ", ".join(self.car.layout.ports), remedy)
-        if not isinstance(self.policy, AbstractPolicy):
+        if not isinstance(self.policy, AbstractPolicy | AbstractVehiclePolicy):
             for name, policy in self.policy.items():
                 _checks.one_of("policy", name, forces)
                 must, remedy = "be a policy", "Such as `control.Skyhook()`."
                 _checks.instance(f"policy[{name!r}]", policy, AbstractPolicy, must, remedy)
-        for name in self.policies(list(forces)):
+        dampers, policy = self.commanded(list(forces))
+        policy.sampled(self.period).initial_state(dampers)  # refuses what does not suit the vehicle or the period
+        for name in self.sensors if isinstance(self.sensors, dict) else ():
+            _checks.one_of("sensors", name, dampers)
+        for name in dampers:
             known = _checks.concrete(forces[name])
             if known is not None and np.ptp(known) == 0.0:
                 must = "have a force that changes at once with its command"
                 remedy = 'Blend the forces of its levels, `blend="force"`, or put its lag into `actuator_lag`.'
                 _checks.refuse(name, must, f"one that is {known[0]:g} N at {float(self.still):g} m/s always", remedy)
 
-    def policies(self, dampers: Sequence[str]) -> dict[str, AbstractPolicy]:
-        """The policy of each of these dampers that has one."""
-        if isinstance(self.policy, AbstractPolicy):
-            return dict.fromkeys(dampers, self.policy)
-        return {name: self.policy[name] for name in dampers if name in self.policy}
+    def commanded(self, dampers: Sequence[str]) -> tuple[tuple[str, ...], AbstractVehiclePolicy]:
+        """Which of these dampers are commanded, and the policy of all of them."""
+        if isinstance(self.policy, AbstractVehiclePolicy):
+            return tuple(dampers), self.policy
+        each = dict.fromkeys(dampers, self.policy) if isinstance(self.policy, AbstractPolicy) else self.policy
+        chosen = {name: each[name] for name in dampers if name in each}
+        return tuple(chosen), EachDamper(chosen)
+
+    def sensors_of(self, dampers: Sequence[str]) -> tuple[Sensors | None, ...]:
+        """The sensors of each of these dampers."""
+        each = self.sensors if isinstance(self.sensors, dict) else dict.fromkeys(dampers, self.sensors)
+        return tuple(each.get(name) for name in dampers)
 
     @property
     def passive(self) -> AbstractVehicle:
@@ -111,7 +132,7 @@ class Controlled(AbstractVehicle):
     def layout(self) -> Layout:
         """That of the vehicle, with the channels of command and demand of each damper."""
         layout = self.car.layout
-        dampers = list(self.policies(list(_forces_at_levels(self.car, self.still))))
+        dampers, _ = self.commanded(list(_forces_at_levels(self.car, self.still)))
         return dataclasses.replace(layout, channels=(*layout.channels, *_channels(dampers)))
 
     def system(self) -> System:
@@ -119,7 +140,7 @@ class Controlled(AbstractVehicle):
         return _controlled_system(self, self.layout)
 
 
-def _channels(dampers: list[str]) -> list[Channel]:
+def _channels(dampers: Sequence[str]) -> list[Channel]:
     """The channels of control, commands before demands."""
     commands = [Channel(f"{d}_command", ChannelKind.COMMAND, d, f"command of {d}, in its unit") for d in dampers]
     words = "force that the controller demands of {}, positive where it resists extension"
@@ -140,34 +161,60 @@ def _forces_at_levels(car: AbstractVehicle, velocity: Scalar) -> dict[str, Float
 def _controlled_system(vehicle: Controlled, layout: Layout) -> System:
     system, frame = vehicle.car.system(), vehicle.car.frame()
     takes = [name for name, law in zip(system.layout.ports, system.laws, strict=True) if len(scheduled_in(law)) == 1]
-    policies = vehicle.policies(takes)
-    if not policies:
+    dampers, policy = vehicle.commanded(takes)
+    if not dampers:
         _checks.refuse("car", "have a damper that takes a command, for its controller", ", ".join(system.layout.ports))
-    ports = tuple(system.layout.ports.index(name) for name in policies)
+    ports = tuple(system.layout.ports.index(name) for name in dampers)
     n, motion, outputs = len(system.layout.coordinates), system.motion, system.outputs
-    rows = system.form.ports[np.array(ports)]
-    body = jnp.zeros_like(rows)
-    for part in frame.bodies:  # above a damper is the body that lengthens it when it rises
-        own = np.array([name in part.masses for name in system.layout.coordinates])
-        height = system.layout.coordinates.index(f"z_{part.name}")
-        body = jnp.where(own[None, :] & (rows[:, height] > 0.0)[:, None], rows, body)
+    body, pitch, roll, tyre, ground = rows_of(frame, system.form.ports[np.array(ports)])
     rates = (getattr(motion, name)[n:] for name in ("motion", "force", "road", "road_rate"))
     loop = ControlLoop(
-        tuple(policies.values()),
+        policy.sampled(vehicle.period),
         body,
+        pitch,
+        roll,
+        tyre,
+        ground,
         LinearMap(*(body @ rate for rate in rates)),
         vehicle.actuator_lag,
         vehicle.sensor_lag,
         vehicle.still,
+        dampers,
         ports,
         vehicle.period,
         vehicle.delay,
+        vehicle.sensors_of(dampers),
+        vehicle.rate_limit,
     )
     more = 2 * len(ports)  # commands and demands stand behind the forces
     wide = LinearMap(
         *(jnp.pad(a, ((0, more), (0, 0))) for a in (outputs.motion, outputs.force, outputs.road, outputs.road_rate))
     )
-    count, forces = outputs.force.shape
-    force = jnp.pad(wide.force, ((0, 0), (0, more))).at[count:, forces:].set(jnp.eye(more))
+    count = outputs.force.shape[0]
+    force = jnp.concatenate([wide.force, jnp.eye(count + more, more, -count)], axis=1)
     outputs = dataclasses.replace(wide, force=force)
     return dataclasses.replace(system, layout=layout, outputs=outputs, control=loop)
+
+
+def rows_of(frame: Frame, ports: Float[Array, "dampers q"]) -> tuple[Array, ...]:
+    """What the sensors see of the coordinates: body above each damper, its pitch and roll, wheel and road below."""
+    names = frame.coordinates
+    body, pitch, roll, tyre = (jnp.zeros_like(ports) for _ in range(4))
+    for part in frame.bodies:  # above a damper is the body that lengthens it when it rises
+        place = names.index(f"z_{part.name}")
+        above = ports[:, place : place + 1] > 0.0
+
+        def of(coordinates: Collection[str], above: Array = above) -> Array:
+            own = np.array([name in coordinates for name in names])
+            return jnp.where(own[None, :] & above, ports, 0.0)
+
+        turns = {turn.axis: {part.angle(turn.axis)} for turn in part.turns}
+        body = body + of(part.masses)
+        pitch, roll = pitch + of(turns.get("pitch", ())), roll + of(turns.get("roll", ()))
+    columns = []
+    for wheel in frame.wheels:  # below a damper is the wheel that shortens it when it rises
+        row = matrix([wheel.point], names)[0]
+        below = (jnp.count_nonzero(row) == 1) & ((ports @ row)[:, None] < 0.0)
+        tyre = tyre + jnp.where(below, row[None, :], 0.0)
+        columns.append(jnp.where(below, 1.0, 0.0))
+    return body, pitch, roll, tyre, jnp.concatenate(columns, axis=1)

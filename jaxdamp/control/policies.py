@@ -13,7 +13,7 @@ from typing import NamedTuple, final
 from jaxtyping import PyTree
 
 from jaxdamp._types import Number, Scalar
-from jaxdamp.parameters import Module, check_parameters, interval, nonnegative, parameter, readable, real
+from jaxdamp.parameters import AbstractDeclared, interval, nonnegative, parameter, real
 
 
 class Signals(NamedTuple):
@@ -25,6 +25,9 @@ class Signals(NamedTuple):
         body_acceleration: of the body above, up [m/s²].
         stroke: deflection between them, extension positive [m].
         velocity: its rate [m/s].
+        pitch_velocity: part of the body's velocity that comes from its pitch, up at this damper [m/s].
+        roll_velocity: part that comes from its roll.
+        tyre_deflection: height of the wheel below over the road, from rest [m]; zero of a damper above no wheel.
     """
 
     body_velocity: Scalar
@@ -32,19 +35,29 @@ class Signals(NamedTuple):
     body_acceleration: Scalar
     stroke: Scalar
     velocity: Scalar
+    pitch_velocity: Scalar = 0.0  # pyright: ignore[reportAssignmentType]
+    roll_velocity: Scalar = 0.0  # pyright: ignore[reportAssignmentType]
+    tyre_deflection: Scalar = 0.0  # pyright: ignore[reportAssignmentType]
+
+    @property
+    def heave_velocity(self) -> Scalar:
+        """Part of the body's velocity that is not of pitch or roll [m/s]: that of its centre of gravity."""
+        return self.body_velocity - self.pitch_velocity - self.roll_velocity
 
 
-class AbstractPolicy(Module):
+class AbstractPolicy(AbstractDeclared):
     """A demanded force from the signals of one damper: derive your own, with parameters as a law has them.
 
     It may hold any equinox module, such as a network, and may have states that it carries from sample to sample.
     """
 
-    def __check_init__(self) -> None:
-        check_parameters(self)
+    def sampled(self, period: float) -> "AbstractPolicy":
+        """The same policy for samples every `period` [s]: what depends on the period is computed here, once a run.
 
-    def __repr__(self) -> str:
-        return readable(self)
+        A policy with filters, integrators or buffers returns one that has their numbers; others are as they are.
+        """
+        del period
+        return self
 
     def initial_state(self) -> PyTree:
         """What it remembers before the first sample: arrays, or nothing."""
@@ -90,7 +103,7 @@ class Groundhook(AbstractPolicy):
 
 
 @final
-class Hybrid(AbstractPolicy):
+class HybridHook(AbstractPolicy):
     """F = g (σ ż_b − (1 − σ) ż_w): skyhook and groundhook by shares σ and 1 − σ."""
 
     gain: Number = parameter("N s/m", "force per velocity", nonnegative, default=3000.0)
@@ -132,16 +145,37 @@ class PowerDriven(AbstractPolicy):
 
 @final
 class StateFeedback(AbstractPolicy):
-    """F = g_b ż_b + g_w ż_w + g_x x + g_v v + g_a z̈_b: linear feedback, such as a clipped LQR."""
+    """F = g_b ż_b + g_w ż_w + g_x x + g_v v + g_a z̈_b + g_t d: linear feedback, such as `control.lqr` finds it."""
 
     body_velocity: Number = parameter("N s/m", "force per velocity of the body", real, default=0.0)
     wheel_velocity: Number = parameter("N s/m", "force per velocity of the wheel", real, default=0.0)
     body_acceleration: Number = parameter("kg", "force per acceleration of the body", real, default=0.0)
     stroke: Number = parameter("N/m", "force per stroke", real, default=0.0)
     velocity: Number = parameter("N s/m", "force per rate of the stroke", real, default=0.0)
+    tyre_deflection: Number = parameter("N/m", "force per deflection of the tyre", real, default=0.0)
 
     def __call__(self, seen: Signals, state: PyTree) -> tuple[Scalar, PyTree]:
         """The demanded force [N]."""
         force = self.body_velocity * seen.body_velocity + self.wheel_velocity * seen.wheel_velocity
         force = force + self.body_acceleration * seen.body_acceleration
-        return force + self.stroke * seen.stroke + self.velocity * seen.velocity, state
+        force = force + self.stroke * seen.stroke + self.velocity * seen.velocity
+        return force + self.tyre_deflection * seen.tyre_deflection, state
+
+
+@final
+class ModalSkyhook(AbstractPolicy):
+    """F = g_h ż_h + g_p ż_p + g_r ż_r: skyhook with a gain for each of heave, pitch and roll.
+
+    ż_h, ż_p and ż_r are the parts of the body's velocity at the damper, so no lever arms are needed: at a damper a_i
+    ahead of the centre of gravity ż_p = a_i θ̇, and all of them together give the moment Σ a_i² g_p θ̇. Equal gains are
+    `Skyhook`.
+    """
+
+    heave: Number = parameter("N s/m", "force per velocity of heave", nonnegative, default=3000.0)
+    pitch: Number = parameter("N s/m", "force per velocity of pitch at the damper", nonnegative, default=3000.0)
+    roll: Number = parameter("N s/m", "force per velocity of roll at the damper", nonnegative, default=3000.0)
+
+    def __call__(self, seen: Signals, state: PyTree) -> tuple[Scalar, PyTree]:
+        """The demanded force [N]."""
+        turning = self.pitch * seen.pitch_velocity + self.roll * seen.roll_velocity
+        return self.heave * seen.heave_velocity + turning, state

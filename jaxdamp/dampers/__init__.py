@@ -5,6 +5,7 @@ Velocity is positive in extension (rebound), force is positive when it resists e
 """
 
 from jaxdamp._guesses import answer_guesses
+from jaxdamp.dampers._states import own_states
 from jaxdamp.dampers.acceleration_surface import AccelerationSurface
 from jaxdamp.dampers.base import (
     AbstractDamper,
@@ -12,14 +13,18 @@ from jaxdamp.dampers.base import (
     AbstractStateful,
     AbstractStateless,
     laws_inside as laws_inside,
-    own_states,
 )
 from jaxdamp.dampers.besinger import Besinger
 from jaxdamp.dampers.bilinear import Bilinear
 from jaxdamp.dampers.bouc_wen import BoucWen
 from jaxdamp.dampers.bump_stop import BumpStop
 from jaxdamp.dampers.bushing import Bushing
-from jaxdamp.dampers.command import takes_command as takes_command, with_command
+from jaxdamp.dampers.command import (
+    at_command as at_command,
+    check_commands as check_commands,
+    takes_command as takes_command,
+    with_command,
+)
 from jaxdamp.dampers.contract import Reach as Reach, Traits, from_samples as from_samples
 from jaxdamp.dampers.coulomb_friction import CoulombFriction
 from jaxdamp.dampers.creeping_visco_plastic import CreepingViscoPlastic
@@ -82,9 +87,10 @@ from jaxdamp.dampers.spline_table import SplineTable
 from jaxdamp.dampers.spring import Spring
 from jaxdamp.dampers.stribeck_friction import StribeckFriction
 from jaxdamp.dampers.stroke_dependent import StrokeDependent
-from jaxdamp.dampers.sum import Scaled as Scaled, Sum as Sum
+from jaxdamp.dampers.sum import Scaled as Scaled, Sum as Sum, law_name as law_name
 from jaxdamp.dampers.table import Table, drives_motion as drives_motion
 from jaxdamp.dampers.temperature_scaled import TemperatureScaled
+from jaxdamp.dampers.twin_tube import TwinTube
 from jaxdamp.dampers.visco_plastic import ViscoPlastic
 from jaxdamp.dampers.wrapper import AbstractWrapper
 
@@ -139,6 +145,7 @@ __all__ = [
     "Table",
     "TemperatureScaled",
     "Traits",
+    "TwinTube",
     "ViscoPlastic",
     "own_states",
     "with_command",

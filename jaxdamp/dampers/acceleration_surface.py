@@ -8,8 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp._types import Matrix, Number, Scalar, ScalarLike, State, Vector
+from jaxdamp.dampers._states import own_states
 from jaxdamp.dampers._steps import follow
-from jaxdamp.dampers.base import AbstractDamper, own_states
+from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.contract import Traits
 from jaxdamp.dampers.force_surface import (
     CONSENT,

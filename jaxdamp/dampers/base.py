@@ -16,6 +16,7 @@ import jax.numpy as jnp
 from jaxdamp import _checks
 from jaxdamp._types import Scalar, ScalarLike, State
 from jaxdamp.dampers._functions import by_name, with_functions
+from jaxdamp.dampers._states import own_states
 from jaxdamp.dampers.contract import (
     Condition,
     Reach,
@@ -29,16 +30,12 @@ from jaxdamp.dampers.fitted_range import FittedRange, Motion, RangeNote, Standar
 from jaxdamp.parameters import Module, check_parameters, modules_inside, readable
 
 
-START = "Start from `law.initial_state()`."
-
-
 class AbstractDamper(Module):
     """A force law between two points, with a flat array of states (empty for memoryless laws).
 
     A law whose states are fast compared with a step of about a millisecond derives from this class and defines its own
     `advance`, exact or implicit. Other laws derive from `AbstractStateful`, `AbstractStateless` or
     `AbstractMemoryless`, which define it.
-
     `traits()` are the properties of a law that solvers, fits and other laws need to know besides its forces.
     """
 
@@ -209,6 +206,33 @@ class AbstractDamper(Module):
         """
         return starts_of_bends(self, reach)
 
+    def plainer(self, undetermined: Sequence[str], fastest: float) -> "AbstractDamper | None":
+        """A law with fewer numbers to put in place of this one, where records do not determine some of its numbers.
+
+        `identify.compare` fits it, and recommends it if it predicts as well. Terms of sums and laws in wrappers are
+        left out without this, and numbers that may be zero are tried at zero.
+
+        Arguments:
+            undetermined: names of the numbers that the records do not determine, of a vector once for each.
+            fastest: largest velocity of the records [m/s].
+
+        Returns:
+            The start of its fit; None if there is no plainer law.
+        """
+        del undetermined, fastest
+        return None
+
+    def without_effect(self, fastest: float) -> tuple[str, ...]:
+        """Names of numbers that do not change the force of this law at its values; held in fits of plainer laws.
+
+        Numbers at zero that may be zero are held without this.
+
+        Arguments:
+            fastest: largest velocity of the records [m/s].
+        """
+        del fastest
+        return ()
+
     def __add__(self, other: "AbstractDamper") -> "AbstractDamper":
         """Two laws in parallel: the forces add."""
         if not isinstance(other, AbstractDamper):
@@ -303,20 +327,6 @@ class AbstractStateful(AbstractDamper):
         """Heun's second-order step."""
         rate = self.state_rate(x0, v0, state)
         return state + 0.5 * dt * (rate + self.state_rate(x1, v1, state + dt * rate))
-
-
-def own_states(law: AbstractDamper, state: State, count: int) -> list[Scalar]:
-    """The states as a list of scalars, after a check of their number.
-
-    Arguments:
-        law: the damper law.
-        state: its states, shape (count,).
-        count: number of states that the law has.
-    """
-    if state.size != count:
-        must = f"hold {count} number{'s' * (count != 1)} for {type(law).__name__}"
-        _checks.refuse("state", must, f"of shape {state.shape}", START)
-    return list(state)
 
 
 def laws_inside(tree: object, prefix: str = "") -> list[tuple[str, AbstractDamper]]:

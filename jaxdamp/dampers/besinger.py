@@ -1,6 +1,8 @@
 """The seven-parameter law of Besinger, Cebon and Cole, as paper 001 uses it for a heavy vehicle."""
 
+import dataclasses
 import warnings
+from collections.abc import Sequence
 from typing import final
 
 import numpy as np
@@ -10,6 +12,7 @@ from jaxdamp._limits import at_least, at_most
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers._guesses import secant_rate
 from jaxdamp.dampers.base import AbstractMemoryless, Condition, Reach
+from jaxdamp.dampers.degressive import plainer_curve
 from jaxdamp.parameters import parameter, positive
 
 
@@ -157,3 +160,16 @@ class Besinger(AbstractMemoryless):
             limit_velocity=knee,
             transition_velocity=transition,
         )
+
+    def plainer(self, undetermined: Sequence[str], fastest: float) -> AbstractMemoryless:
+        """Without blow-off where it is not known; else a curve that bends less, or straight lines."""
+        known = 5 - len(self.without_effect(fastest)) - len(undetermined)
+        if not {"blow_off_rate", "limit_velocity"}.isdisjoint(undetermined):
+            limit = 2.0 * fastest
+            rate = transition_rate(limit, self.compression_rate, self.rebound_rate, self.transition_velocity)
+            return dataclasses.replace(self, blow_off_rate=rate, limit_velocity=limit)
+        return plainer_curve(self, known, fastest)
+
+    def without_effect(self, fastest: float) -> tuple[str, ...]:
+        """The blow-off, if the valve opens at none of these velocities."""
+        return ("blow_off_rate", "limit_velocity") if self.limit_velocity > fastest else ()

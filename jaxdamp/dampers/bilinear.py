@@ -1,5 +1,6 @@
 """Two slopes: one for rebound, one for compression."""
 
+from collections.abc import Sequence
 from typing import final
 
 import numpy as np
@@ -7,7 +8,9 @@ import numpy as np
 from jaxdamp._limits import smooth_abs
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers._guesses import secant_rate
+from jaxdamp.dampers._plainer import curve_samples
 from jaxdamp.dampers.base import AbstractMemoryless
+from jaxdamp.dampers.linear import Linear
 from jaxdamp.parameters import nonnegative, parameter, positive, setting
 
 
@@ -37,3 +40,8 @@ class Bilinear(AbstractMemoryless):
     def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "Bilinear":
         """Start values from measured data: the secant slopes of the two sides."""
         return cls(secant_rate(velocity, force, 1), secant_rate(velocity, force, -1))
+
+    def plainer(self, undetermined: Sequence[str], fastest: float) -> Linear:
+        """The same slope on both sides."""
+        del undetermined
+        return Linear.guess(*curve_samples(self, fastest))

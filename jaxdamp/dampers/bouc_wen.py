@@ -1,6 +1,6 @@
 """Smooth hysteresis that saturates: the law of Bouc and Wen."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import final
 
 import jax.numpy as jnp
@@ -10,9 +10,12 @@ from jaxdamp._elementary import power, reciprocal_root
 from jaxdamp._limits import at_least, within
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._guesses import sliding_fit
+from jaxdamp.dampers._states import own_states
 from jaxdamp.dampers._steps import direction
-from jaxdamp.dampers.base import AbstractDamper, own_states
+from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.contract import Traits
+from jaxdamp.dampers.dahl import Dahl
+from jaxdamp.dampers.linear import Linear
 from jaxdamp.parameters import interval, nonnegative, parameter, positive, real
 
 
@@ -184,3 +187,9 @@ class BoucWen(AbstractDamper):
         """Start values from measured data: F ≈ c₀ v + F_y sgn v + f₀ at the higher velocities; x_y starts at 1 mm."""
         rate, level, offset = sliding_fit(velocity, force)
         return cls(rate, 0.0, level, 1e-3, static_force=offset)
+
+    def plainer(self, undetermined: Sequence[str], fastest: float) -> AbstractDamper:
+        """Friction that gives before it slides, beside a viscous force."""
+        del undetermined, fastest
+        friction = Dahl(self.yield_force / self.yield_displacement, self.yield_force)
+        return Linear(max(float(self.viscous_rate), 1.0)) + friction

@@ -4,6 +4,7 @@ from typing import final
 
 import jax.numpy as jnp
 
+from jaxdamp._field_types import check_field_types
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers._series import AbstractSeries, Deflections, require_feed_through
 from jaxdamp.dampers.base import AbstractDamper
@@ -45,6 +46,7 @@ class Bushing(AbstractSeries):
     damping: Number = parameter("N s/m", "c_b, damping of the bushing", positive, adjustable=False)
 
     def __check_init__(self) -> None:
+        check_field_types(self)
         require_feed_through("law", self.law, "Bushing")
 
     def own_state_count(self) -> int:

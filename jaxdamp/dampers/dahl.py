@@ -7,8 +7,9 @@ import numpy as np
 
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._guesses import ELASTIC_TRAVEL, sliding_fit
+from jaxdamp.dampers._states import own_states
 from jaxdamp.dampers._steps import direction, travels
-from jaxdamp.dampers.base import AbstractDamper, own_states
+from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.contract import Traits
 from jaxdamp.parameters import parameter, positive
 

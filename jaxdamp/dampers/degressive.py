@@ -1,5 +1,6 @@
 """A slope that decreases with velocity, as vehicle simulators describe truck dampers."""
 
+from collections.abc import Sequence
 from typing import final
 
 import jax.numpy as jnp
@@ -7,7 +8,10 @@ import numpy as np
 
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers._guesses import knee_scan
+from jaxdamp.dampers._plainer import curve_samples
 from jaxdamp.dampers.base import AbstractMemoryless
+from jaxdamp.dampers.bilinear import Bilinear
+from jaxdamp.dampers.linear import Linear
 from jaxdamp.parameters import nonnegative, parameter, positive
 
 
@@ -56,3 +60,19 @@ class Degressive(AbstractMemoryless):
             )
             values += [max(float(rate), 1.0), 1.0 / knee]
         return cls(*values)
+
+    def plainer(self, undetermined: Sequence[str], fastest: float) -> AbstractMemoryless:
+        """Straight lines, one for each side or for both."""
+        return plainer_curve(self, 4 - len(undetermined), fastest)
+
+
+def plainer_curve(law: AbstractMemoryless, most: int, fastest: float) -> AbstractMemoryless:
+    """A curve of at most so many numbers, or of one, with about the forces of a law.
+
+    Arguments:
+        law: any law of the velocity.
+        most: numbers.
+        fastest: largest velocity [m/s].
+    """
+    kind = Degressive if most >= 4 else Bilinear if most >= 2 else Linear
+    return kind.guess(*curve_samples(law, fastest))

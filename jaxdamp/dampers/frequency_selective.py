@@ -4,10 +4,12 @@ from typing import final
 
 import jax.numpy as jnp
 
+from jaxdamp._field_types import check_field_types
 from jaxdamp._limits import at_least, within
 from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp.dampers._states import own_states
 from jaxdamp.dampers._steps import follow
-from jaxdamp.dampers.base import AbstractDamper, own_states, refuse_states
+from jaxdamp.dampers.base import AbstractDamper, refuse_states
 from jaxdamp.dampers.contract import Traits
 from jaxdamp.parameters import parameter, positive
 
@@ -56,6 +58,7 @@ class FrequencySelective(AbstractDamper):
         return inside._replace(has_feed_through=False, linear_in_parameters=linear, stroke_dependent_at_rest=False)
 
     def __check_init__(self) -> None:
+        check_field_types(self)
         for name in ("high", "low"):
             refuse_states(name, getattr(self, name), "Use a law without states here, and put the states outside.")
 

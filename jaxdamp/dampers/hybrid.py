@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import PRNGKeyArray
 
 from jaxdamp import _checks
+from jaxdamp._field_types import check_field_types
 from jaxdamp._types import Scalar, ScalarLike, State
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.neural_hysteresis import NeuralHysteresis
@@ -39,6 +40,7 @@ class Hybrid(AbstractDamper):
     hysteresis: NeuralHysteresis
 
     def __check_init__(self) -> None:
+        check_field_types(self)
         if not self.backbone.monotone:
             remedy = "Make it with `monotone=True`, or add the two laws: `backbone + hysteresis`."
             _checks.refuse("backbone", "be monotone, so that the hybrid is passive", self.backbone, remedy)

@@ -1,5 +1,6 @@
 """Friction with breakaway: the LuGre law (Lund and Grenoble)."""
 
+from collections.abc import Sequence
 from typing import final
 
 import jax.numpy as jnp
@@ -7,11 +8,17 @@ import numpy as np
 
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._guesses import ELASTIC_TRAVEL, sliding_fit
+from jaxdamp.dampers._plainer import sliding
+from jaxdamp.dampers._states import own_states
 from jaxdamp.dampers._steps import direction, travels
-from jaxdamp.dampers.base import AbstractDamper, own_states
+from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.contract import Traits
+from jaxdamp.dampers.dahl import Dahl
 from jaxdamp.dampers.stribeck_friction import stribeck_force
 from jaxdamp.parameters import nonnegative, parameter, positive
+
+
+NO_FRICTION = 1e-3  # of the breakaway force: as good as zero, which the sliding bristles cannot have
 
 
 @final
@@ -93,3 +100,15 @@ class LuGre(AbstractDamper):
         rate, level, _ = sliding_fit(velocity, force)
         slow = max(0.2 * float(np.max(np.abs(velocity))), 1e-6)
         return cls(level / ELASTIC_TRAVEL, 0.1 * level / slow, rate, level, level, slow)
+
+    def plainer(self, undetermined: Sequence[str], fastest: float) -> AbstractDamper:
+        """This one with almost no friction at high velocity; or friction without breakaway, half of it elastic."""
+        if "friction_force" in undetermined and self.friction_force < NO_FRICTION * self.breakaway_force:
+            return self
+        half = 0.5 * self.friction_force
+        return sliding(self.viscous_rate, half, self.stribeck_velocity, Dahl(self.stiffness, half), fastest)
+
+    def without_effect(self, fastest: float) -> tuple[str, ...]:
+        """The friction at high velocity, if it is almost zero."""
+        del fastest
+        return ("friction_force",) * bool(self.friction_force < NO_FRICTION * self.breakaway_force)

@@ -10,8 +10,9 @@ from jaxdamp._limits import at_least
 from jaxdamp._root import increasing_root
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._guesses import sliding_fit
+from jaxdamp.dampers._states import own_states
 from jaxdamp.dampers._steps import GAMMA, sdirk2
-from jaxdamp.dampers.base import AbstractDamper, own_states
+from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.bouc_wen import hysteresis_rate, hysteresis_step
 from jaxdamp.dampers.contract import Traits
 from jaxdamp.parameters import interval, nonnegative, parameter, positive, real, setting

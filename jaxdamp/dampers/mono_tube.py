@@ -1,44 +1,25 @@
 """The mono-tube damper: oil on both sides of a piston, gas at the end of the tube."""
 
-from typing import NamedTuple, final
+from typing import final
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxdamp import _checks
 from jaxdamp._limits import at_least, at_most, within
 from jaxdamp._root import increasing_root
 from jaxdamp._types import Number, Scalar, ScalarLike, State
-from jaxdamp.dampers._mono_tube_start import charge_start, static_force, valve_start
-from jaxdamp.dampers._steps import GAMMA, sdirk2
-from jaxdamp.dampers.base import AbstractDamper, own_states
-from jaxdamp.dampers.contract import Traits
+from jaxdamp.dampers._states import own_states
+from jaxdamp.dampers._tube import AbstractTube, Oil, newton_step
+from jaxdamp.dampers._tube_start import BULK_MODULUS, tube_start
+from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.coulomb_friction import CoulombFriction
-from jaxdamp.dampers.gas_spring import LEAST_SHARE, GasSpring, gas_pressure
-from jaxdamp.dampers.piston_flow import PistonFlow, flow_per_area
+from jaxdamp.dampers.gas_spring import LEAST_SHARE, GasSpring
+from jaxdamp.dampers.piston_flow import PistonFlow
 from jaxdamp.parameters import parameter, positive, setting
 
 
-def oil_stiffness(x: ScalarLike, bulk_modulus: ScalarLike, area: ScalarLike, volume: ScalarLike) -> Scalar:
-    """B A/(V_r − A x) [Pa/m], increase of the oil pressure with its deflection; V_r − A x is 5 % of V_r or more."""
-    return bulk_modulus * area / at_least(volume - area * x, LEAST_SHARE * volume)
-
-
-EXPONENT, ATMOSPHERE, BULK_MODULUS = 1.3, 101_325.0, 1e9  # n, Pa and Pa where nothing is known
-STEP_ANGLE = 0.0055  # rad, of a fit: at 0.015 the gas volume is wrong by a standard error, at 0.06 others by two
-LEAK_SHARE = 0.01  # of the flow through the bleed when a valve opens
-
-
-class _Oil(NamedTuple):
-    """Within a step: the deflection [m] or its rate [m/s], and S of the flow [√Pa]."""
-
-    deflection: Scalar
-    root: Scalar
-
-
 @final
-class MonoTube(AbstractDamper):
+class MonoTube(AbstractTube):
     """F = A (p_r − p_c) − (p_c − p_atm) A_r + F_c tanh(v/v_f), p_r and p_c the pressures above and below the piston.
 
     It combines three laws: the `piston` of annular area A with bleed, leak and valves, the `gas`, which acts on the rod
@@ -88,17 +69,6 @@ class MonoTube(AbstractDamper):
     bulk_modulus: Number = parameter("Pa", "B, of the oil and its chamber", positive, adjustable=False)
     cavitation_pressure: Number = setting("Pa", "p_v, absolute pressure of a cavity", positive, default=1e5)
 
-    def traits(self) -> Traits:
-        """The pressures are states; the friction of the seal alone cannot balance a spring; gas is an offset."""
-        own = super().traits()._replace(has_feed_through=False, contains_offset=True)
-        return own._replace(solves_equation=True, step_angle=STEP_ANGLE)
-
-    def __check_init__(self) -> None:
-        charge, cavity = _checks.concrete(self.gas.pressure), _checks.concrete(self.cavitation_pressure)
-        if charge is not None and cavity is not None and not np.all(charge > cavity):
-            must = "be above the cavitation pressure [Pa]"
-            _checks.refuse("MonoTube.gas.pressure", must, f"{charge} beside {cavity}", "It is an absolute pressure.")
-
     @property
     def stroke_limits(self) -> tuple[Scalar, Scalar]:
         """Lowest and highest stroke [m]: 5 % of the gas is left, 5 % of the volume above the piston is left."""
@@ -107,10 +77,7 @@ class MonoTube(AbstractDamper):
 
     def pressures(self, x: ScalarLike, deflection: ScalarLike) -> tuple[Scalar, Scalar]:
         """p_r and p_c [Pa, absolute] at stroke x [m] and deflection e [m]."""
-        gas = self.gas
-        rise = oil_stiffness(x, self.bulk_modulus, self.piston.area, self.rebound_volume) * deflection
-        below = gas_pressure(self._gas_stroke(x, deflection), gas.pressure, gas.volume, gas.rod_area, gas.exponent)
-        return at_least(gas.pressure + rise, self.cavitation_pressure), below
+        return self._above(x, deflection), self._gas_pressure(self._gas_stroke(x, deflection))
 
     def _gas_stroke(self, x: ScalarLike, deflection: ScalarLike) -> Scalar:
         """Stroke [m] at which the rod alone would give the present gas volume."""
@@ -137,18 +104,12 @@ class MonoTube(AbstractDamper):
         drop = self._drop(x, deflection)
         return (v - self.piston.flow_velocity(self.piston.root(drop), self.piston.passages(drop >= 0)))[None]
 
-    def _flow(
-        self, x: ScalarLike, free: Scalar, duration: ScalarLike, before: Scalar, *, search: bool = True
-    ) -> tuple[Scalar, Scalar]:
-        """Q/A [m/s] and S [√Pa] of an implicit step: the flow that the pressures at its end cause.
+    def _roots_at(self, x: ScalarLike, deflections: State) -> tuple[Scalar, ...]:
+        (deflection,) = own_states(self, deflections, 1)
+        return (self.piston.root(self._drop(x, deflection)),)
 
-        Arguments:
-            x: stroke at the end [m].
-            free: deflection at the end without flow [m].
-            duration: duration of the step [s].
-            before: S before the step [√Pa], from which the search starts.
-            search: until the equation is solved; otherwise one step of Newton's method, for predictions.
-        """
+    def _stage(self, x: ScalarLike, v: ScalarLike, now: Oil, duration: ScalarLike, *, search: bool) -> Oil:
+        free = now.deflections[0] + duration * v  # without flow
         above, below = self.pressures(x, free)
         passages = self.piston.passages(above >= below)
 
@@ -160,61 +121,13 @@ class MonoTube(AbstractDamper):
         most = self.piston.root(above - below)
         zero = jnp.zeros_like(most)
         lower, upper = at_most(most, zero), at_least(most, zero)
+        (before,) = now.roots
         guess = jnp.where(before * most > 0, within(before, lower, upper), most)
         if search:
             root = increasing_root(surplus, guess, lower, upper, steps=20)
         else:
-            value, slope = jax.jvp(surplus, (guess,), (jnp.ones_like(guess),))
-            root = within(guess - value / slope, lower, upper)
-        return self.piston.flow_velocity(root, passages), root
-
-    def _root_at(self, x: ScalarLike, deflection: Scalar) -> Scalar:
-        """S [√Pa] at an instant."""
-        return self.piston.root(self._drop(x, deflection))
-
-    def implicit_stage(self, x: ScalarLike, v: ScalarLike, state: State, duration: ScalarLike) -> State:
-        """One stage of backward Euler."""
-        (deflection,) = own_states(self, state, 1)
-        free = deflection + duration * v
-        flow, _ = self._flow(x, free, duration, self._root_at(x - duration * v, deflection))
-        return (free - duration * flow)[None]
-
-    def advance(
-        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
-    ) -> State:
-        """Two-stage SDIRK step; the velocity is taken as linear over the step."""
-        return self._moved(x0, v0, x1, v1, state, dt, search=True)
-
-    def predict(
-        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
-    ) -> State:
-        """The step with one step of Newton's method in each stage: a third of the cost."""
-        return self._moved(x0, v0, x1, v1, state, dt, search=False)
-
-    def _moved(
-        self,
-        x0: ScalarLike,
-        v0: ScalarLike,
-        x1: ScalarLike,
-        v1: ScalarLike,
-        state: State,
-        dt: ScalarLike,
-        *,
-        search: bool,
-    ) -> State:
-        (deflection,) = own_states(self, state, 1)
-
-        def stage(share: float, now: _Oil) -> _Oil:
-            v, duration = v0 + share * (v1 - v0), GAMMA * dt
-            # the velocity is linear over the step
-            x = x1 if share == 1.0 else x0 + share * (x1 - x0) - 0.5 * share * dt * (1.0 - share) * (v1 - v0)
-            flow, root = self._flow(x, now.deflection + duration * v, duration, now.root, search=search)
-            return _Oil(v - flow, root)
-
-        def moved(rate: _Oil, now: _Oil, part: float) -> _Oil:
-            return _Oil(now.deflection + part * dt * rate.deflection, rate.root)
-
-        return sdirk2(stage, moved, _Oil(deflection, self._root_at(x0, deflection))).deflection[None]
+            root = newton_step(surplus, guess, lower, upper)
+        return Oil((v - self.piston.flow_velocity(root, passages))[None], (root,))
 
     def incompressible(self) -> AbstractDamper:
         """`piston + gas + friction`, the limit B → ∞ without cavities: no states, for sweeps and for slow motion."""
@@ -254,32 +167,17 @@ class MonoTube(AbstractDamper):
         Raises:
             ValueError: no geometry; a rod as thick as the piston.
         """
-        for name, given in (("piston_diameter", piston_diameter), ("rod_diameter", rod_diameter)):
-            if given is None:
-                example = "functools.partial(MonoTube.guess, piston_diameter=0.046, rod_diameter=0.011)"
-                remedy = f"Write `fit({example}, runs)`."
-                _checks.refuse(name, "be stated [m]", None, remedy)
-            _checks.positive(name, given)
-        assert piston_diameter is not None and rod_diameter is not None
-        if not rod_diameter < piston_diameter:
-            _checks.refuse("rod_diameter", f"be below the piston's {piston_diameter} m", rod_diameter)
-        velocity, force, stroke = (np.asarray(a, dtype=float) for a in (velocity, force, stroke))
-        rod_area = 0.25 * np.pi * rod_diameter**2
-        area = 0.25 * np.pi * piston_diameter**2 - rod_area
-        travel = max(float(np.ptp(stroke)), 1e-3)
-        level, stiffness, friction = static_force(velocity, force, stroke)
-        charge = charge_start(level, stiffness, travel, rod_area, EXPONENT, ATMOSPHERE)
-        oil = force - level - stiffness * stroke
-        rebound, compression = (valve_start(velocity, oil, side, area, float(flow_per_area())) for side in (1, -1))
+        geometry = piston_diameter, rod_diameter, gas_pressure, gas_volume
+        start = tube_start("MonoTube", (velocity, force, stroke), *geometry)
+        area, rebound, compression = start.area, *(start.valve(side, start.area) for side in (1, -1))
         bleed = float(np.sqrt(rebound.bleed_area * compression.bleed_area))
-        friction = min(friction, rebound.friction, compression.friction)  # hysteresis adds to each
         opening = min(rebound.opening_pressure, compression.opening_pressure)
-        leak = LEAK_SHARE * float(flow_per_area()) * bleed / np.sqrt(opening)
+        leak = rebound._replace(bleed_area=bleed, opening_pressure=opening).leak
         return cls(
             PistonFlow(area, bleed, *rebound[1:4], *compression[1:4], leak=leak),
-            GasSpring(gas_pressure or charge.pressure, gas_volume or charge.volume, rod_area, EXPONENT),
-            CoulombFriction(max(friction, 1.0), 0.01 * float(np.max(np.abs(velocity)))),
-            rebound_volume or area * (max(float(np.max(stroke)), 0.0) + travel),
+            start.gas,
+            start.seal(rebound, compression),
+            rebound_volume or start.oil_volume(1, area),
             BULK_MODULUS,
         )
 

@@ -10,7 +10,8 @@ from jaxdamp import _checks
 from jaxdamp._limits import at_least
 from jaxdamp._random import normal
 from jaxdamp._types import Number, Scalar, ScalarLike, State, Vector
-from jaxdamp.dampers.base import AbstractDamper, own_states
+from jaxdamp.dampers._states import own_states
+from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.contract import Traits
 from jaxdamp.parameters import parameter, positive, setting, weight
 

@@ -1,5 +1,7 @@
 """A piecewise-linear force-velocity curve."""
 
+import dataclasses
+from collections.abc import Sequence
 from typing import final
 
 import equinox as eqx
@@ -11,7 +13,9 @@ from jaxdamp import _checks
 from jaxdamp._limits import ramp
 from jaxdamp._types import Number, Scalar, ScalarLike, Vector
 from jaxdamp.dampers._guesses import velocity_grid
+from jaxdamp.dampers._plainer import curve_samples
 from jaxdamp.dampers.base import AbstractMemoryless
+from jaxdamp.dampers.degressive import plainer_curve
 from jaxdamp.parameters import increasing, nonnegative, parameter, positive, real, setting
 
 
@@ -71,3 +75,25 @@ class PiecewiseLinear(AbstractMemoryless):
         jumps = np.linalg.lstsq(np.stack(columns, axis=1), force, rcond=None)[0]
         slopes = np.cumsum(jumps)
         return cls(knots, np.maximum(slopes, 0.02 * max(slopes.max(), 1.0)))
+
+    def plainer(self, undetermined: Sequence[str], fastest: float) -> AbstractMemoryless | None:
+        """Without the knots at which the curve bends least; or a curve without any.
+
+        Half of those that are not known are left out: of two in one bend, neither is known until one is left.
+        First those beyond the largest velocity, where nothing was measured, and all but one of several at one place.
+        """
+        knots = np.unique(self.knots)
+        left = self.knots.size - max((undetermined.count("knots") + 1) // 2, 1)
+        if not self.knots.size:
+            return None
+        knots = knots[np.abs(knots) < fastest]
+        if left < 1 or not knots.size:
+            most = min(self.knots.size + self.slopes.size - len(undetermined), 2 * knots.size + 1)
+            return plainer_curve(self, most, fastest)
+        velocity = np.array([-fastest, *knots, fastest])
+        force = np.interp(velocity, *curve_samples(self, fastest))
+        while len(velocity) > left + 2:
+            chords = force[:-2] + (force[2:] - force[:-2]) * np.diff(velocity[:-1]) / (velocity[2:] - velocity[:-2])
+            least = 1 + int(np.argmin(np.abs(force[1:-1] - chords)))
+            velocity, force = np.delete(velocity, least), np.delete(force, least)
+        return dataclasses.replace(self, knots=velocity[1:-1], slopes=np.diff(force) / np.diff(velocity))

@@ -127,6 +127,10 @@ class PistonFlow(AbstractMemoryless):
         share = jnp.tanh(at_least(jnp.abs(drop) - passages.opening, 0.0) * passages.per_pressure)
         return (passages.bleed + passages.valve * share) * root + passages.leak * drop
 
+    def flow_either(self, root: ScalarLike) -> Scalar:
+        """Q/A [m/s] at S [√Pa], through the valve that opens in its direction."""
+        return self.flow_velocity(root, self.passages(jnp.asarray(root) >= 0))
+
     def _root_at(self, v: ScalarLike) -> Scalar:
         """S [√Pa] at which Q/A is v."""
         v = jnp.asarray(v)

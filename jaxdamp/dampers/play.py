@@ -6,6 +6,7 @@ from typing import final
 
 import jax.numpy as jnp
 
+from jaxdamp._field_types import check_field_types
 from jaxdamp._limits import within
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers._series import AbstractSeries, Deflections, require_feed_through
@@ -83,6 +84,7 @@ class Play(AbstractClearance):
     clearance: Number = parameter("m", "δ, half the free travel", nonnegative, adjustable=False)
 
     def __check_init__(self) -> None:
+        check_field_types(self)
         require_feed_through("law", self.law, "Play")
 
     def contact(self) -> tuple[ScalarLike, ScalarLike]:

@@ -19,15 +19,11 @@ from jaxdamp.parameters import nonnegative, parameter, positive
 Numbers = Float[Array, "..."]
 
 
-def _arctan(u: Numbers) -> Numbers:
-    return (2.0 / np.pi) * jnp.arctan((0.5 * np.pi) * u)
-
-
-def _algebraic(u: Numbers) -> Numbers:
-    return u * reciprocal_root(1.0 + u * u)
-
-
-SHAPES: dict[str, Callable[[Numbers], Numbers]] = {"tanh": jnp.tanh, "arctan": _arctan, "algebraic": _algebraic}
+SHAPES: dict[str, Callable[[Numbers], Numbers]] = {
+    "tanh": jnp.tanh,
+    "arctan": lambda u: (2.0 / np.pi) * jnp.arctan((0.5 * np.pi) * u),
+    "algebraic": lambda u: u * reciprocal_root(1.0 + u * u),
+}
 
 
 @final

@@ -2,6 +2,7 @@
 
 from typing import final
 
+from jaxdamp._field_types import check_field_types
 from jaxdamp._types import Number, Scalar
 from jaxdamp.dampers._series import AbstractSeries, Deflections, require_feed_through
 from jaxdamp.dampers.base import AbstractDamper
@@ -33,6 +34,7 @@ class SeriesSpring(AbstractSeries):
     )
 
     def __check_init__(self) -> None:
+        check_field_types(self)
         require_feed_through("law", self.law, "SeriesSpring")
 
     def spring_force(self, deflections: Deflections) -> Scalar:

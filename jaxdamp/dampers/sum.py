@@ -11,7 +11,9 @@ from jaxdamp import _checks
 from jaxdamp._traced import behind
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp._vectors import joined
-from jaxdamp.dampers.base import START, AbstractDamper
+from jaxdamp._words import class_words
+from jaxdamp.dampers._states import refuse_number
+from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.contract import Traits, combined_traits
 from jaxdamp.dampers.fitted_range import Motion
 from jaxdamp.dampers.range_use import with_fitted_range
@@ -113,8 +115,7 @@ class Sum(AbstractDamper):
         sizes = [term.initial_state().size for term in self.terms]
         ends = [sum(sizes[: i + 1]) for i in range(len(sizes))]
         if state.size != ends[-1]:
-            must = f"hold {ends[-1]} numbers for the terms of the sum"
-            _checks.refuse("state", must, f"of shape {state.shape}", START)
+            refuse_number(state, f"{ends[-1]} numbers for the terms of the sum")
         return [(term, state[end - size : end]) for term, size, end in zip(self.terms, sizes, ends, strict=True)]
 
 
@@ -126,3 +127,11 @@ def terms_of(law: AbstractDamper) -> tuple[AbstractDamper, ...]:
         return law.terms
     covered = law.fitted_to.without("force")
     return tuple(with_fitted_range(term, covered) if term.fitted_to is None else term for term in law.terms)
+
+
+def law_name(law: AbstractDamper) -> str:
+    """The classes of a law in words: "Besinger + series spring", "linear + Coulomb friction"."""
+    if isinstance(law, Sum):
+        return " + ".join(law_name(term) for term in law.terms)
+    words, inside = class_words(law), law.inner_laws()
+    return f"{law_name(inside[0])} + {words}" if len(inside) == 1 else words

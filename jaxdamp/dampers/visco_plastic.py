@@ -1,6 +1,7 @@
 """Yielding elements in parallel with a concave viscous force: magnetorheological and other friction dampers."""
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from typing import final
 
 import jax
@@ -12,9 +13,12 @@ from jaxdamp._elementary import power
 from jaxdamp._limits import within
 from jaxdamp._types import Number, Scalar, ScalarLike, State, Vector
 from jaxdamp.dampers._guesses import sliding_fit
+from jaxdamp.dampers._plainer import sliding
+from jaxdamp.dampers._states import own_states
 from jaxdamp.dampers._steps import travels
-from jaxdamp.dampers.base import AbstractDamper, own_states
+from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.contract import Traits
+from jaxdamp.dampers.dahl import Dahl
 from jaxdamp.dampers.play import dead_zone
 from jaxdamp.parameters import interval, nonnegative, parameter, positive
 
@@ -170,3 +174,10 @@ class ViscoPlastic(AbstractViscoPlastic):
         """Exact for a constant velocity."""
         periods, limit = duration / self.relaxation_times, self.clearances + self.elastic_travels
         return jax.vmap(element_step, (0, None, 0, 0))(deflections, travel, periods, limit)
+
+    def plainer(self, undetermined: Sequence[str], fastest: float) -> AbstractDamper:
+        """One element in place of all, which gives from the start, beside a viscous force."""
+        del undetermined
+        elastic = Dahl((self.sliding_forces / self.elastic_travels).sum(), self.sliding_forces.sum())
+        rate = self.viscous_force * fastest ** (self.exponent - 1.0)
+        return sliding(rate, self.yield_force, self.flow_velocity, elastic, fastest)

@@ -4,10 +4,10 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from jaxdamp import _checks
 from jaxdamp._types import Scalar, ScalarLike, State
 from jaxdamp._vectors import joined
-from jaxdamp.dampers.base import START, AbstractDamper
+from jaxdamp.dampers._states import refuse_number
+from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.contract import Traits
 
 
@@ -40,8 +40,7 @@ class AbstractWrapper(AbstractDamper):
         """The wrapper's own states, and those of the law inside."""
         count = self.own_state_count()
         if state.size < count:
-            must = f"hold {count} state{'s' * (count > 1)} of {type(self).__name__} first"
-            _checks.refuse("state", must, f"of shape {state.shape}", START)
+            refuse_number(state, f"{count} state{'s' * (count > 1)} of {type(self).__name__} first")
         return tuple(state[i] for i in range(count)), state[count:]
 
     def is_linear_in_law(self) -> bool:

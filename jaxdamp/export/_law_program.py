@@ -28,25 +28,15 @@ _RESERVED = frozenset(
 
 @dataclasses.dataclass(frozen=True)
 class LawNumber:
-    """A parameter or a setting of a law.
+    """A parameter or a setting of a law."""
 
-    Attributes:
-        path: as in `jaxdamp.parameters`.
-        name: the path as an identifier of C and JavaScript.
-        unit: SI unit.
-        meaning: one line.
-        domain: the allowed values.
-        value: the numbers of the law.
-        kind: "parameter", "setting", or "command", which is set from outside.
-    """
-
-    path: str
-    name: str
-    unit: str
-    meaning: str
-    domain: Domain
-    value: np.ndarray
-    kind: str
+    path: str  # as in `jaxdamp.parameters`
+    name: str  # the path as an identifier of C and JavaScript
+    unit: str  # SI unit
+    meaning: str  # one line
+    domain: Domain  # the allowed values
+    value: np.ndarray  # the numbers of the law
+    kind: str  # "parameter", "setting", or "command", which is set from outside
 
 
 def law_numbers(law: eqx.Module) -> list[LawNumber]:

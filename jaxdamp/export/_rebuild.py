@@ -14,14 +14,7 @@ from jax.tree_util import Partial
 from jaxdamp import _checks
 from jaxdamp._tables import Contents
 from jaxdamp._types import Number
-from jaxdamp.dampers import (
-    UNITS,
-    AbstractDamper,
-    FittedRange,
-    StandardError,
-    with_fitted_range,
-    with_standard_errors,
-)
+from jaxdamp.dampers import UNITS, AbstractDamper, FittedRange, StandardError, with_fitted_range, with_standard_errors
 from jaxdamp.parameters import as_float
 
 
@@ -156,8 +149,11 @@ def _filled(module: Any, given: Contents, notes: Contents) -> Any:
     """An empty module with the values of a file; fields that it does not give have their default."""
     name, fields = type(module).__name__, own_fields(type(module))
     for field in fields:
-        here = f"{name}.{field.name}"
-        value: Any = _of_field(field, given[field.name], here) if field.name in given else field.default
+        here, number = f"{name}.{field.name}", declared(field)
+        value: Any = field.default
+        if field.name in given:
+            plain = given[field.name]
+            value = _value(plain, here) if number is None else _number(plain, number["unit"], here)
         if field.type is Number and np.ndim(value):
             _checks.refuse(here, "be one number", value)
         object.__setattr__(module, field.name, value)
@@ -178,12 +174,6 @@ def _class_named(name: str, where: str) -> type:
         remedy = f"{hint}Import the module of your own classes first."
         _checks.refuse(where, "be of a class that is known", repr(name), remedy)
     return classes[name]
-
-
-def _of_field(field: dataclasses.Field, plain: object, where: str) -> Any:
-    """The value of a field as it is written."""
-    number = declared(field)
-    return _value(plain, where) if number is None else _number(plain, number["unit"], where)
 
 
 def _fitted_to(plain: object, owner: str) -> FittedRange | None:

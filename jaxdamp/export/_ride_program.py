@@ -9,10 +9,11 @@ from jaxdamp import _checks
 from jaxdamp.codegen import Program, Symbols, symbols
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.export._law_program import LawProgram
-from jaxdamp.export._vehicle_program import FlatTree, Numbers, VehicleProgram, road_input
+from jaxdamp.export._prepared_program import FlatTree, Numbers
+from jaxdamp.export._vehicle_program import VehicleProgram, road_input
 from jaxdamp.parameters import get, modules_inside, with_values
 from jaxdamp.simulation import MetricObserver
-from jaxdamp.vehicles import AbstractVehicle
+from jaxdamp.vehicles import AbstractVehicle, refuse_controller
 
 
 class RideProgram(VehicleProgram):
@@ -32,6 +33,7 @@ class RideProgram(VehicleProgram):
     """
 
     def __init__(self, law: LawProgram, vehicle: AbstractVehicle, dt: float, count: int) -> None:
+        refuse_controller(vehicle, "a page")
         super().__init__(vehicle, member=law.member)
         inside = [(prefix, module) for prefix, module in modules_inside(self.vehicle) if prefix]
         self._places = [prefix for prefix, module in inside if eqx.tree_equal(module, law.law)]

@@ -1,66 +1,24 @@
 """A vehicle as functions of its numbers, which are printed in other languages."""
 
-import itertools
-import math
-from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import TypeAlias
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, PyTree
 
 from jaxdamp._vectors import MemoryLayout, scalars
-from jaxdamp.codegen import Constant, Program, Symbols, lower, printing, symbols
-from jaxdamp.export._law_program import law_numbers
-from jaxdamp.parameters import with_values
-from jaxdamp.simulation import AbstractStepper, Equations, Exponential, RoadInput, settled
-from jaxdamp.vehicles import AbstractVehicle, Channel, ChannelKind, refuse_controller
+from jaxdamp.codegen import Program, Symbols, lower, symbols
+from jaxdamp.export._prepared_program import Numbers, PreparedProgram
+from jaxdamp.simulation import Equations, Exponential, RoadInput, settled
+from jaxdamp.vehicles import AbstractVehicle, Channel, ChannelKind
 
 
-Numbers: TypeAlias = PyTree[Array]  # of a vehicle, in the order of `VehicleProgram.numbers`
-
-
-class FlatTree:
-    """How the numbers of a tree lie in one array of the program.
-
-    Arguments:
-        shapes: such a tree, with `jax.ShapeDtypeStruct` in place of arrays of numbers.
-
-    Attributes:
-        count: the length of the array.
-    """
-
-    def __init__(self, shapes: PyTree) -> None:
-        arrays, self._others = eqx.partition(shapes, lambda leaf: isinstance(leaf, jax.ShapeDtypeStruct))
-        leaves, self._structure = jax.tree.flatten(arrays)
-        self._shapes = [leaf.shape for leaf in leaves]
-        self.count = sum(math.prod(shape) for shape in self._shapes)
-
-    def arrays(self, tree: PyTree) -> list[Array]:
-        """The arrays of a tree."""
-        return jax.tree.leaves(eqx.filter(tree, eqx.is_array))
-
-    def tree(self, arrays: Sequence[Array]) -> PyTree:
-        """The tree with these arrays."""
-        return eqx.combine(jax.tree.unflatten(self._structure, arrays), self._others)
-
-    def symbols(self, name: str, dtype: str) -> list[Symbols]:
-        """The arrays as stretches of one array of the program."""
-        ends = np.cumsum([math.prod(shape) for shape in self._shapes])
-        names = np.array([f"{name}[{k}]" for k in range(self.count)], object)
-        parts = np.split(names, ends[:-1]) if self._shapes else []
-        return [Symbols(part.reshape(shape), dtype) for part, shape in zip(parts, self._shapes, strict=True)]
-
-
-class VehicleProgram:
+class VehicleProgram(PreparedProgram):
     """A vehicle whose functions can be printed: those of a run of `simulate`, and those of solvers of other programs.
 
-    What follows from the parameters and the step lies in an array m, which `prepare` fills. The carry of a run is an
-    array c; its first numbers are the states x of the equations of motion: q, q̇ and the states of the elements. The
-    road is the heights h [m] under the wheels and their rates r [m/s].
+    The first numbers of the carry c are the states x of the equations of motion: q, q̇ and the states of the elements.
+    The road is the heights h [m] under the wheels and their rates r [m/s].
 
     Arguments:
         vehicle: any vehicle.
@@ -68,15 +26,11 @@ class VehicleProgram:
         member: what the language writes between `p` and the name of a number: "->" in C, "." in JavaScript.
 
     Attributes:
-        vehicle: the vehicle.
-        numbers: its parameters and settings.
         wheels: their number.
     """
 
     def __init__(self, vehicle: AbstractVehicle, dtype: str = "float64", member: str = "->") -> None:
-        refuse_controller(vehicle, "C code and FMUs")
-        self.vehicle, self.dtype, self.member = vehicle, dtype, member
-        self.numbers = law_numbers(self.vehicle)
+        super().__init__(vehicle, dtype, member)
         self.layout, self.wheels = vehicle.layout, len(vehicle.wheel_names)
         self._state_sizes = [int(law.initial_state().size) for law in self.vehicle.elements()]
 
@@ -99,58 +53,17 @@ class VehicleProgram:
         """The channels that the vehicle gives: all but the heights of the road."""
         return [channel for channel in self.layout.channels if channel.kind is not ChannelKind.ROAD_HEIGHT]
 
-    @property
-    def sizes(self) -> dict[str, int]:
-        """Lengths of the arrays m and c."""
-        return {"m": self.prepare.results.size, "c": self._carry.count}
-
-    @cached_property
-    def prepare(self) -> Program:
-        """`prepare(p, dt)`: m, the matrices of a step of dt [s] and the numbers of the laws."""
-        computed = [atom for part in self._matrices.results for atom in part.flat if not isinstance(atom, Constant)]
-        return Program(self._matrices.statements, np.array(computed, object))
-
-    @cached_property
-    def _matrices(self) -> Program:
-        """The arrays of the stepper."""
-
-        def prepare(values: Numbers, dt: Array) -> list[Array]:
-            return self._stepper.arrays(self._prepared(values, dt))
-
-        return lower(prepare, self.values(), self._symbols("dt"), finite=True)
-
-    @cached_property
-    def _stepper(self) -> FlatTree:
-        """The stepper of the engine, which holds the equations."""
-        return self._flat(self._prepared, self.values(), self._symbols("dt"))
-
-    def _prepared(self, values: Numbers, dt: Array) -> AbstractStepper:
+    def _prepared(self, values: Numbers, dt: Array) -> PyTree:
         return Exponential().stepper(Equations(self.vehicle_of(values).system(), MemoryLayout.SCALARS), dt)
 
-    @cached_property
-    def _held(self) -> list[Symbols]:
-        """The stepper: numbers that are known, such as the zeros of a matrix, and the others as entries of m."""
-        place = itertools.count()
-        name = np.frompyfunc(lambda atom: atom if isinstance(atom, Constant) else f"m[{next(place)}]", 1, 1)
-        return [Symbols(np.array(name(part), object), self.dtype) for part in self._matrices.results]
-
-    @cached_property
-    def _carry(self) -> FlatTree:
-        """What a run carries from step to step."""
-        return self._flat(self._started, self._held, *self._road("h", "r"))
-
-    def _started(self, held: list[Array], height: Array, rate: Array) -> PyTree:
+    def _started(self, held: list[Array], *inputs: Array) -> PyTree:
+        """At rest in the static equilibrium on a road."""
         stepper = self._stepper.tree(held)
-        return stepper.start(settled(stepper.equations.system, height), road_input(height, rate))
+        return stepper.start(settled(stepper.equations.system, inputs[0]), road_input(*inputs))
 
-    @cached_property
-    def start(self) -> Program:
-        """`start(m, h, r)`: at rest in the static equilibrium on a road: c."""
-
-        def start(held: list[Array], height: Array, rate: Array) -> list[Array]:
-            return self._carry.arrays(self._started(held, height, rate))
-
-        return self._lowered(start, *self._road("h", "r"))
+    @property
+    def _inputs(self) -> list[Symbols]:
+        return self._road("h", "r")
 
     @cached_property
     def step(self) -> Program:
@@ -193,15 +106,6 @@ class VehicleProgram:
         arguments, changes = (self.values(), *self._point()), (self.values("dp"), *self._point("d"))
         return lower(lambda point, change: jax.jvp(observed, point, change)[1], arguments, changes, finite=True)
 
-    def vehicle_of(self, values: Numbers) -> AbstractVehicle:
-        """The vehicle with other numbers, in the order of `numbers`."""
-        vehicle = jax.tree.map(lambda a: jnp.asarray(a, self.dtype) if eqx.is_inexact_array(a) else a, self.vehicle)
-        return with_values(vehicle, {n.path: value for n, value in zip(self.numbers, values, strict=True)})
-
-    def values(self, owner: str = "p") -> PyTree[Symbols]:
-        """All numbers, as members of an object of the program."""
-        return [symbols(f"{owner}{self.member}{n.name}", n.value.shape, self.dtype) for n in self.numbers]
-
     def _observed(
         self, equations: Equations, motion: Array, states: list[Array], height: Array, rate: Array
     ) -> tuple[tuple[Array, list[Array]], Array]:
@@ -221,29 +125,8 @@ class VehicleProgram:
         motion, *states = np.split(names, np.cumsum([2 * len(self.layout.coordinates), *self._state_sizes])[:-1])
         return Symbols(motion, self.dtype), [Symbols(s, self.dtype) for s in states], *self._road(f"{d}h", f"{d}r")
 
-    @property
-    def _carried(self) -> list[Symbols]:
-        return self._carry.symbols("c", self.dtype)
-
-    def _lowered(self, function: Callable[..., PyTree], *arguments: PyTree[Symbols]) -> Program:
-        """A function of the stepper and other arguments."""
-        return lower(function, self._held, *arguments, finite=True)
-
-    def _flat(self, function: Callable[..., PyTree], *arguments: PyTree[Symbols]) -> FlatTree:
-        """How the numbers of what a function returns lie in an array of the program."""
-
-        def shape(symbols: Symbols) -> jax.ShapeDtypeStruct:
-            return jax.ShapeDtypeStruct(symbols.names.shape, symbols.dtype)
-
-        with printing(), jax.enable_x64(self.dtype == "float64"):
-            shapes = jax.tree.map(shape, arguments, is_leaf=lambda leaf: isinstance(leaf, Symbols))
-            return FlatTree(eqx.filter_eval_shape(function, *shapes))
-
     def _road(self, *names: str) -> list[Symbols]:
         return [symbols(name, (self.wheels,), self.dtype) for name in names]
-
-    def _symbols(self, name: str) -> Symbols:
-        return symbols(name, (), self.dtype)
 
 
 def road_input(height: Array, rate: Array) -> RoadInput:

@@ -15,10 +15,11 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._tables import Contents
+from jaxdamp._words import class_words, first_upper, metric_words
 from jaxdamp._writing import write_whole
 from jaxdamp.bench import BenchRun
 from jaxdamp.codegen import JavaScript, PrintedFunction, Program, lower, symbols
-from jaxdamp.dampers import AbstractDamper, laws_inside
+from jaxdamp.dampers import AbstractDamper, law_name
 from jaxdamp.export._law_program import LawNumber, LawProgram
 from jaxdamp.export._ride_program import RideProgram
 from jaxdamp.export.module_file import to_json
@@ -159,7 +160,7 @@ def to_explorer(
         functions["BASELINE"] = law_functions(other) | vehicle_functions(other_car)
         compared, substeps = _of_law(other, other_car, "baseline"), max(substeps, other_ride.substeps)
     data = {
-        "title": " › ".join(dict.fromkeys(type(each).__name__ for _, each in laws_inside(law))),
+        "title": first_upper(law_name(law)),
         "file": file.stem,
         "law": about | {"document": json.loads(to_json(law)), "conditions": program.conditions},
         "baseline": compared,
@@ -181,7 +182,7 @@ def _of_profile(road: AbstractRoad | str, ride: Ride) -> Contents:
     if isinstance(road, str):
         return {}
     assert ride.heights is not None
-    return {"profile": {"title": f"given road ({type(road).__name__})", "heights": _packed(ride.heights[:, 0])}}
+    return {"profile": {"title": f"given road ({class_words(road)})", "heights": _packed(ride.heights[:, 0])}}
 
 
 def _check_vehicle(vehicle: AbstractVehicle) -> None:
@@ -196,10 +197,11 @@ def _of_car(car: RideProgram) -> Contents:
     """The vehicle with its numbers, metrics and the channels that these need."""
     vehicle = car.vehicle
     channels = [
-        {"name": name, "unit": vehicle.units[name], "meaning": vehicle.descriptions[name]} for name in car.needed
+        {"name": name, "title": metric_words(name), "unit": vehicle.units[name], "meaning": vehicle.descriptions[name]}
+        for name in car.needed
     ]
     return {
-        "vehicle": {"title": type(vehicle).__name__, "numbers": [_of_number(number) for number in car.numbers]},
+        "vehicle": {"title": class_words(vehicle), "numbers": [_of_number(number) for number in car.numbers]},
         "metrics": [_of_metric(metric, vehicle) for metric in car.metrics],
         "channels": channels,
     }
@@ -269,7 +271,7 @@ def _range(number: LawNumber, value: float, largest: float) -> tuple[float, floa
 
 
 def _of_metric(metric: Any, vehicle: AbstractVehicle) -> Contents:
-    title = metric.name.replace("_", " ") + (f", {metric.weighting}" if metric.weighting else "")
+    title = metric_words(metric.name) + (f", {metric.weighting}" if metric.weighting else "")
     unit, main = metric.unit(vehicle.units), bool(_MAIN.match(metric.name))
     return {"name": metric.name, "title": title, "unit": unit, "main": main, "signed": metric.statistic.signed}
 

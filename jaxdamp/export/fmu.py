@@ -1,4 +1,4 @@
-"""A law or a vehicle as functional mock-up unit (FMI 2.0)."""
+"""A law, a vehicle or a controller as functional mock-up unit (FMI 2.0)."""
 
 import hashlib
 import importlib.metadata
@@ -13,7 +13,7 @@ import xml.etree.ElementTree as ET
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -21,9 +21,12 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.export._c_text import law_source, vehicle_source
+from jaxdamp.export._c_text import law_source
+from jaxdamp.export._controlled_program import ControlledProgram
+from jaxdamp.export._controller_program import ControllerProgram, program_of
 from jaxdamp.export._law_program import LawNumber, LawProgram, identifier
 from jaxdamp.export._vehicle_program import VehicleProgram
+from jaxdamp.export._vehicle_text import controller_source, vehicle_source
 from jaxdamp.simulation import substeps_needed
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -37,6 +40,9 @@ _LOCAL = {"causality": "local", "initial": "calculated"} | _SIGNAL
 _FIXED = {"causality": "parameter", "variability": "fixed", "initial": "exact"}
 
 
+AnyProgram: TypeAlias = LawProgram | VehicleProgram | ControllerProgram
+
+
 class Variable(NamedTuple):
     """A variable of the model description; its value reference is its place in the list."""
 
@@ -48,26 +54,18 @@ class Variable(NamedTuple):
     derivative_of: int | None = None
 
 
-def variables(program: LawProgram | VehicleProgram, longest_step: float) -> list[Variable]:
+def variables(program: AnyProgram, longest_step: float) -> list[Variable]:
     """All variables, in the order of unit.c: values and rates of the inputs, outputs, numbers, states, their rates."""
-    signals = _of_law(program) if isinstance(program, LawProgram) else _of_vehicle(program)
+    if isinstance(program, ControllerProgram):
+        signals = _of_controller(program)
+    else:
+        signals = _of_law(program) if isinstance(program, LawProgram) else _of_vehicle(program)
     said = {"description": "longest step of the model; longer communication steps are divided"}
     listed = [*signals, Variable("longest_step", "s", _FIXED | said, longest_step, (1e-9, np.inf))]
     listed += [variable for number in program.numbers for variable in _of_number(number)]
     if not program.numbers:
         listed.append(Variable("none", "", _FIXED, 0.0))
-    states = (
-        [(f"state[{k}]", "") for k in range(program.states)]
-        if isinstance(program, LawProgram)
-        else [(f"state.{name}", unit) for name, unit in program.states]
-    )
-    first = len(listed)
-    listed += [Variable(name, unit, _LOCAL) for name, unit in states]
-    rates = {"m": "m/s", "m/s": "m/s^2", "rad": "rad/s", "rad/s": "rad/s^2"}
-    listed += [
-        Variable(f"der({name})", rates.get(unit, ""), _LOCAL, derivative_of=first + k)
-        for k, (name, unit) in enumerate(states)
-    ]
+    listed += _of_states(program, len(listed))
     names = [variable.name for variable in listed]
     double = next((name for name in names if names.count(name) > 1), None)
     if double is not None:
@@ -91,6 +89,29 @@ def _of_vehicle(program: VehicleProgram) -> Iterator[Variable]:
         yield Variable(channel.name, channel.unit, _OUTPUT | {"description": channel.description})
 
 
+def _of_controller(program: ControllerProgram) -> Iterator[Variable]:
+    for line in program.inputs:
+        yield Variable(line.name, line.unit, _INPUT | {"description": line.description}, 0.0)
+    for line in program.outputs:
+        yield Variable(line.name, line.unit, _OUTPUT | {"description": line.description})
+
+
+def _of_states(program: AnyProgram, first: int) -> list[Variable]:
+    """The states, of which the first has this place, and their rates, if an importing tool may integrate them."""
+    if isinstance(program, ControlledProgram | ControllerProgram):
+        return []
+    if isinstance(program, LawProgram):
+        states = [(f"state[{k}]", "") for k in range(program.states)]
+    else:
+        states = [(f"state.{name}", unit) for name, unit in program.states]
+    listed = [Variable(name, unit, _LOCAL) for name, unit in states]
+    rates = {"m": "m/s", "m/s": "m/s^2", "rad": "rad/s", "rad/s": "rad/s^2"}
+    return listed + [
+        Variable(f"der({name})", rates.get(unit, ""), _LOCAL, derivative_of=first + k)
+        for k, (name, unit) in enumerate(states)
+    ]
+
+
 def _of_number(number: LawNumber) -> Iterator[Variable]:
     """One variable for each number; `terms.0.knots` becomes `terms[0].knots[1]`."""
     name = re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", number.path)
@@ -103,8 +124,10 @@ def _of_number(number: LawNumber) -> Iterator[Variable]:
         )
 
 
-def description(model: object, known: list[Variable], name: str, guid: str) -> str:
-    """The model description as XML."""
+def description(program: AnyProgram, known: list[Variable], name: str, guid: str) -> str:
+    """The model description as XML; what is sampled is for co-simulation only."""
+    model = program.law if isinstance(program, LawProgram) else program.vehicle
+    sampled = isinstance(program, ControlledProgram | ControllerProgram)
     root = ET.Element(
         "fmiModelDescription",
         fmiVersion="2.0",
@@ -117,11 +140,13 @@ def description(model: object, known: list[Variable], name: str, guid: str) -> s
     )
     can = {"canGetAndSetFMUstate": "true", "canSerializeFMUstate": "true", "canNotUseMemoryManagementFunctions": "true"}
     steps = {"canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": "true"}
-    for kind, more in (("ModelExchange", {"providesDirectionalDerivative": "true"}), ("CoSimulation", steps)):
+    kinds = {"ModelExchange": {"providesDirectionalDerivative": "true"}, "CoSimulation": steps}
+    for kind, more in list(kinds.items())[sampled:]:
         files = ET.SubElement(ET.SubElement(root, kind, {"modelIdentifier": name} | can | more), "SourceFiles")
         ET.SubElement(files, "File", {"name": f"{name}.c"})
+    step = program.vehicle.period if isinstance(program, ControllerProgram) else _LONGEST_STEP
     _units(ET.SubElement(root, "UnitDefinitions"), {variable.unit for variable in known} - {""})
-    ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize="0.001")
+    ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize=repr(step))
     listed = ET.SubElement(root, "ModelVariables")
     for place, variable in enumerate(known):
         attributes = {"name": variable.name, "valueReference": str(place)} | variable.about
@@ -171,8 +196,14 @@ _LONGEST_STEP = 1e-3  # s
 _WHEN = (2000, 1, 1, 0, 0, 0)  # of all files in the archive: the same model gives the same file
 
 
-def to_fmu(law: AbstractDamper | AbstractVehicle, path: str | os.PathLike[str], *, compiler: str | None = "cc") -> Path:
-    """Write a law or a whole vehicle as FMU of FMI 2.0, for co-simulation and for model exchange.
+def to_fmu(
+    law: AbstractDamper | AbstractVehicle,
+    path: str | os.PathLike[str],
+    *,
+    part: str = "whole",
+    compiler: str | None = "cc",
+) -> Path:
+    """Write a law, a whole vehicle or a controller as FMU of FMI 2.0, for co-simulation and for model exchange.
 
     Inputs of a law are the stroke `x` and the velocity `v`, positive in extension; the output is the force `F`,
     positive when it resists extension. Inputs of a vehicle are the heights of the road under its wheels and their
@@ -186,9 +217,16 @@ def to_fmu(law: AbstractDamper | AbstractVehicle, path: str | os.PathLike[str], 
     outputs and rates by inputs, states and parameters, as implicit solvers and linearisations want them. The file has
     C sources, and a binary for this platform if there is a compiler.
 
+    A controlled vehicle and, with `part="controller"`, its controller alone are for co-simulation only, since they jump
+    at their samples. Communication steps may be of any length, also different ones, that can be divided so that
+    samples lie between two steps; others are an error, which is logged. Inputs of a controller are what its sensors
+    measure, such as `damper_body_velocity`; outputs are commands and demands, which belong to the inputs of the same
+    instant once these are set; right after a step they belong to inputs that are held.
+
     Arguments:
         law: any law or composition, or any vehicle with its laws.
         path: the file to write, NAME.fmu; an existing one is replaced, and never left incomplete.
+        part: "whole", or "controller" for the controller of a controlled vehicle alone.
         compiler: the command of a C compiler with the options of gcc; None for an FMU of sources only, which the
             importing tool compiles.
 
@@ -197,7 +235,7 @@ def to_fmu(law: AbstractDamper | AbstractVehicle, path: str | os.PathLike[str], 
 
     Raises:
         ValueError: a folder that does not exist, a name that is no identifier of C, a vehicle whose laws are too steep
-            for steps of 1/64 ms.
+            for steps of 1/64 ms, a controller of a law or a vehicle that has none.
         NotImplementedError: an operation of a law that cannot be printed; the message names it.
         RuntimeError: a compiler that fails.
     """
@@ -207,25 +245,33 @@ def to_fmu(law: AbstractDamper | AbstractVehicle, path: str | os.PathLike[str], 
     if file.suffix != ".fmu" or identifier(name) != name:
         must = "be a file NAME.fmu whose name is an identifier of C"
         _checks.refuse("path", must, str(file), f"Try {identifier(name) + '.fmu'!r}.")
-    if isinstance(law, AbstractDamper):
-        program, longest, code = LawProgram(law), _LONGEST_STEP, "law.c"
-        model, printed = program.law, law_source(program, "model", ("force", "state_rate"))
-    else:
-        program, longest, code = VehicleProgram(law), _LONGEST_STEP / substeps_needed(law, _LONGEST_STEP), "vehicle.c"
-        model, printed = program.vehicle, vehicle_source(program, "model", derivatives=True)
-    listed = variables(program, longest)
-    texts = [
-        printed.static(),
-        *((_TEXTS / file).read_text(encoding="utf-8") for file in (code, "unit.c", "services.c")),
-    ]
+    program = program_of(law, part)
+    longest = _LONGEST_STEP
+    if isinstance(law, AbstractVehicle):
+        longest /= substeps_needed(law, _LONGEST_STEP)
+    listed, (code, text) = variables(program, longest), _printed(program)
+    texts = [text, *((_TEXTS / file).read_text(encoding="utf-8") for file in (code, "unit.c", "services.c"))]
     guid = hashlib.sha256(repr((texts, listed)).encode()).hexdigest()[:32]
-    source = "\n".join([f'#define GUID "{{{guid}}}"', f"#define DEFAULT_STEP {longest!r}\n", *texts])
-    contents = {"modelDescription.xml": description(model, listed, name, guid).encode()}
+    defines = {"GUID": f'"{{{guid}}}"', "DEFAULT_STEP": repr(longest)}
+    if isinstance(program, ControlledProgram | ControllerProgram):
+        defines |= {"PERIOD": repr(program.vehicle.period), "DELAY": repr(program.delay)}
+    source = "\n".join([*(f"#define {key} {value}" for key, value in defines.items()), "", *texts])
+    contents = {"modelDescription.xml": description(program, listed, name, guid).encode()}
     contents |= {f"sources/{h.name}": h.read_bytes() for h in sorted(_TEXTS.glob("*.h"))}
     contents[f"sources/{name}.c"] = source.encode()
     if compiler is not None:
         contents |= _binary(contents, name, compiler)
     return write_whole(file, _archive(contents))
+
+
+def _printed(program: AnyProgram) -> tuple[str, str]:
+    """The file of this kind of model, and the functions that it calls."""
+    if isinstance(program, LawProgram):
+        return "law.c", law_source(program, "model", ("force", "state_rate")).static()
+    if isinstance(program, ControllerProgram):
+        return "controller.c", controller_source(program, "model").static()
+    derivatives = not isinstance(program, ControlledProgram)
+    return "vehicle.c", vehicle_source(program, "model", derivatives).static()
 
 
 def _binary(contents: dict[str, bytes], name: str, compiler: str) -> dict[str, bytes]:

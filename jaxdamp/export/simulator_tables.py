@@ -52,19 +52,12 @@ def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vector
 
 
 class SettledTable(NamedTuple):
-    """The force of a law over velocity, and what a reader of the table must know.
+    """The force of a law over velocity, and what a reader of the table must know."""
 
-    Attributes:
-        velocity: [m/s], positive in rebound, shape (points,).
-        force: [N], positive when it resists extension, shape (points,).
-        comments: lines of text.
-        left_out: the rows that were left out and why; empty if there are none.
-    """
-
-    velocity: np.ndarray
-    force: np.ndarray
-    comments: list[str]
-    left_out: str
+    velocity: np.ndarray  # [m/s], positive in rebound, shape (points,)
+    force: np.ndarray  # [N], positive when it resists extension, shape (points,)
+    comments: list[str]  # lines of text
+    left_out: str  # the rows that were left out and why; empty if there are none
 
 
 def settled_table(law: AbstractDamper, velocities: VectorLike, call: str) -> SettledTable:

@@ -11,13 +11,13 @@ from jaxdamp.identify.estimates import Estimate as Estimate, rounded as rounded
 from jaxdamp.identify.fitting import fit, solve
 from jaxdamp.identify.judging import judge
 from jaxdamp.identify.ladder import (
-    LAWS,
+    LAWS as LAWS,
     NAMED_LAWS as NAMED_LAWS,
     LearntStart,
     NamedLaw as NamedLaw,
     default_ladder,
     ladder_starts,
-    laws_table,
+    laws_table as laws_table,
     suited_laws as suited_laws,
 )
 from jaxdamp.identify.law_result import FitResult as FitResult
@@ -34,10 +34,10 @@ from jaxdamp.identify.predicting import (
     Score as Score,
     error_shares,
     fit_percent,
-    predict_runs,
+    predict_runs as predict_runs,
 )
 from jaxdamp.identify.preparing import prepare
-from jaxdamp.identify.problem import AbstractResiduals, Problem
+from jaxdamp.identify.problem import AbstractResiduals as AbstractResiduals, Problem
 from jaxdamp.identify.profile import ProfileCurve as ProfileCurve
 from jaxdamp.identify.propagation import Band as Band, Evidence as Evidence, Propagated as Propagated
 from jaxdamp.identify.record_sensitivity import RecordSensitivity as RecordSensitivity
@@ -46,14 +46,18 @@ from jaxdamp.identify.rungs import Failure as Failure, Rung as Rung
 from jaxdamp.identify.scheduling import LeftOutSetting as LeftOutSetting, ScheduledFit as ScheduledFit, fit_scheduled
 from jaxdamp.identify.targets import TargetFit as TargetFit, fit_targets
 from jaxdamp.identify.training import Training as Training, train
+from jaxdamp.identify.vehicle_comparing import (
+    VehicleComparison as VehicleComparison,
+    VehicleRung as VehicleRung,
+    fit_each_vehicle as fit_each_vehicle,
+)
 from jaxdamp.identify.vehicle_fitting import fit_vehicle
+from jaxdamp.identify.vehicle_ladder import FORMS as FORMS, friction_ladder
 from jaxdamp.identify.vehicle_residuals import virtual_ride
 from jaxdamp.identify.vehicle_result import ChannelScore as ChannelScore, VehicleFit as VehicleFit
 
 
 __all__ = [
-    "LAWS",
-    "AbstractResiduals",
     "LearntStart",
     "MachineLimits",
     "Problem",
@@ -69,10 +73,9 @@ __all__ = [
     "fit_scheduled",
     "fit_targets",
     "fit_vehicle",
+    "friction_ladder",
     "judge",
     "ladder_starts",
-    "laws_table",
-    "predict_runs",
     "prepare",
     "solve",
     "train",

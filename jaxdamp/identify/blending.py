@@ -138,7 +138,7 @@ def off_span(model: Model, runs: Sequence[BenchRun], initial_state: str) -> list
     levels = np.unique(np.concatenate([np.asarray(law.levels) for law in inside]))
 
     def at(command: float) -> np.ndarray:
-        return _force(model, [dataclasses.replace(run, command=command) for run in runs], initial_state)
+        return _force(model, [run.held_at(command) for run in runs], initial_state)
 
     forces = {level: at(level) for level in map(float, levels)}
     remedy = ' Blend the forces, `Scheduled(..., blend="force")`, or add records at a setting in between.'

@@ -2,105 +2,43 @@
 
 import dataclasses
 import functools
-import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, ClassVar, ParamSpec, Protocol, cast, overload, runtime_checkable
 
-import jax
-import jax.numpy as jnp
-
+from jaxdamp._pieces import piece
 from jaxdamp._progress import Progress
-from jaxdamp._results import AbstractResult, plotted
-from jaxdamp._status import Status
-from jaxdamp._tables import Table, with_unit
+from jaxdamp._results import plotted
+from jaxdamp._tables import Contents, Table, with_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Figure
-from jaxdamp.bench import BenchRun, as_runs, usable
+from jaxdamp.bench import BenchRun, RideRecord, as_runs, usable
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.identify.comparison import AbstractComparison, side_by_side
 from jaxdamp.identify.fitting import NUMERICAL, fit
 from jaxdamp.identify.held_out import HeldOut, on_records, without_parts
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import OFFSET, Machine
-from jaxdamp.identify.rungs import Failure, Recommendation, Rung, ladder_table, recommendation, verdict
+from jaxdamp.identify.reducing import reduced
+from jaxdamp.identify.rungs import Failure, Rung, ladder_table, verdict
 from jaxdamp.identify.scheduling import fit_scheduled, settings_stated
-from jaxdamp.identify.starting import AbstractTrainedStart, Start, check_starts
+from jaxdamp.identify.starting import AbstractTrainedStart, Start, check_starts, frozen_by
+from jaxdamp.identify.vehicle_comparing import VehicleComparison, compare_vehicles
+from jaxdamp.parameters import name_patterns
+from jaxdamp.vehicles import AbstractVehicle
 
 
-MOST_THREADS = 4  # fits side by side: more of them wait for Python's lock
+P = ParamSpec("P")
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class Comparison(AbstractResult):
-    """Laws fitted to the same records, in the order given.
+class Comparison(AbstractComparison[Rung, BenchRun]):
+    """Laws fitted to the same records, in the order given."""
 
-    Attributes:
-        rungs: the laws that were fitted, with their errors.
-        held_out: the records scored on, not fitted; empty if parts of the fitted ones were held out.
-        failed: the laws without a fit, and why.
-    """
-
-    rungs: tuple[Rung, ...]
-    held_out: tuple[BenchRun, ...]
-    failed: tuple[Failure, ...] = ()
-
-    @classmethod
-    def of(cls, outcomes: Iterable[Rung | Failure], held_out: Iterable[BenchRun] = ()) -> "Comparison":
-        """The comparison of the outcomes of `fit_each`.
-
-        Raises:
-            ValueError: no law could be fitted.
-        """
-        outcomes = tuple(outcomes)
-        rungs = tuple(outcome for outcome in outcomes if isinstance(outcome, Rung))
-        failed = tuple(outcome for outcome in outcomes if isinstance(outcome, Failure))
-        if not rungs:
-            reasons = list(dict.fromkeys(failure.reason for failure in failed))
-            texts = reasons if len(reasons) == 1 else [f"{failure.name}: {failure.reason}" for failure in failed]
-            raise ValueError(f"None of {len(failed)} laws could be fitted. {' '.join(texts)}")
-        return cls(rungs, tuple(held_out), failed)
-
-    @functools.cached_property
-    def recommendation(self) -> Recommendation:
-        """The recommended law, those that predict as well, and those left aside."""
-        return recommendation(self.rungs)
-
-    @property
-    def best(self) -> Rung:
-        """The recommended law: the simplest that predicts motion held out as well as any, within the noise.
-
-        It is no law with numbers at bounds or not identifiable, or whose search did not converge, where another is as
-        good (`recommendation`).
-        """
-        return self.recommendation.rung
-
-    @property
-    def best_fit(self) -> Rung:
-        """The law with the smallest error on the fitted records, however many numbers it needs."""
-        return min(self.rungs, key=lambda rung: rung.rmse)
-
-    @property
-    def status(self) -> Status:
-        """How the search of the recommended law ended."""
-        return self.best.result.status
-
-    @property
-    def summary(self) -> str:
-        """The recommended law and its errors: the first sentence of the verdict."""
-        return self.verdict[0]
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """The warnings of all fits, which concern the records and not a law, such as contradicting records."""
-        first, *others = (rung.result.warnings for rung in self.rungs)
-        return tuple(warning for warning in first if all(warning in warnings for warnings in others))
+    kind: ClassVar[str] = "law"
 
     def __getitem__(self, name: str) -> FitResult:
         """The fit of the law of that name."""
-        for rung in self.rungs:
-            if rung.name == name:
-                return rung.result
-        why = "".join(f" {failure.name} failed: {failure.reason}" for failure in self.failed if failure.name == name)
-        raise KeyError(f"No law is named {name!r}; there are {', '.join(r.name for r in self.rungs)}.{why}")
+        return self.rung(name).result
 
     @property
     def verdict(self) -> tuple[str, ...]:
@@ -115,24 +53,10 @@ class Comparison(AbstractResult):
         """Each law with its number of free parameters, its errors, their shares, and remarks."""
         return ladder_table(self.rungs, self.failed, self.best.name)
 
-    def content(self) -> dict[str, Any]:
-        """All fits as numbers with units and words, ready for JSON; numbers that are not finite are None."""
-        laws = {
-            rung.name: {
-                **rung.result.to_dict(),
-                "held_out_fit": with_unit(rung.held_out_fit_percent, "%"),
-                "held_out_rmse": with_unit(rung.held_out_rmse, "N"),
-            }
-            for rung in self.rungs
-        }
-        return {
-            "best": self.best.name,
-            "best_fit": self.best_fit.name,
-            "verdict": list(self.verdict),
-            "held_out": [run.name for run in self.held_out],
-            "laws": laws,
-            "failed": {failure.name: failure.reason for failure in self.failed},
-        }
+    def held_out_errors(self, rung: Rung) -> Contents:
+        """The errors of a law on motion held out, as plain data."""
+        errors = {"held_out_fit": (rung.held_out_fit_percent, "%"), "held_out_rmse": (rung.held_out_rmse, "N")}
+        return {name: with_unit(*error) for name, error in errors.items()}
 
     def plot(self, kind: str = "ladder", **options: Any) -> Figure:
         """The errors of the laws side by side (`plots.ladder`), or the sheet of the recommended law.
@@ -160,6 +84,34 @@ class Comparison(AbstractResult):
         return "\n".join([*lines, *about_records, answer, f"best: {self.best.name}"])
 
 
+@runtime_checkable
+class CompareCall(Protocol[P]):
+    """`compare` by what is compared: laws on bench records, or vehicles on records of their motion."""
+
+    @overload
+    def __call__(
+        self, laws: Mapping[str, AbstractVehicle], runs: RideRecord | Iterable[RideRecord], **options: Any
+    ) -> VehicleComparison: ...
+    @overload
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> Comparison: ...
+
+
+def of_any_kind(compare: Callable[P, Comparison]) -> CompareCall[P]:
+    """The same function, which hands vehicles to the comparison of vehicles."""
+
+    @functools.wraps(compare)
+    def by_kind(*args: P.args, **options: P.kwargs) -> Comparison | VehicleComparison:
+        laws = args[0] if args else options.get("laws")
+        if isinstance(laws, Mapping) and any(isinstance(law, AbstractVehicle) for law in laws.values()):
+            given = dict(zip(("laws", "runs"), args, strict=False)) | options
+            named = {{"laws": "vehicles", "runs": "records"}.get(name, name): value for name, value in given.items()}
+            return compare_vehicles(**cast(dict[str, Any], named))
+        return compare(*args, **options)
+
+    return cast(CompareCall[P], by_kind)
+
+
+@of_any_kind
 @of_known_numbers
 def compare(
     laws: Mapping[str, Start],
@@ -181,8 +133,12 @@ def compare(
 
     A law that cannot be fitted or scored does not stop the comparison: it is listed in `failed` with the reason.
 
+    Vehicles are compared on records of their motion in the same way: `compare(friction_ladder(car), drives)` gives a
+    `VehicleComparison`. Each of two drives or more is left out in turn, one drive is divided in time; errors of all
+    channels are taken together. `options` are then those of `fit` for vehicles.
+
     Arguments:
-        laws: starts by name, such as `default_ladder(runs)`.
+        laws: starts by name, such as `default_ladder(runs)`; or vehicles, such as `friction_ladder(car)`.
         runs: records to fit.
         held_out: records to judge on, which are not fitted, instead of parts of `runs`.
         rig: the test machine of all fits, as in `fit`; a zero error of the load cell if left out, since a law that must
@@ -215,7 +171,7 @@ def compare(
         def counted(name: str) -> None:
             nonlocal number
             number += 1
-            shown(f"{name}, {number} of {len(laws)}")
+            shown(f"{name}, {number} of {len(laws)}" if number <= len(laws) else f"{name}, made simpler")
 
         how = {"rig": rig, "scheduled": scheduled, "progress": progress or counted, "bad_records": bad_records}
         comparison = Comparison.of(fit_each(laws, runs, held_out, **how, **options), held_out)
@@ -230,12 +186,15 @@ def fit_each(
     *,
     rig: Machine = OFFSET,
     scheduled: bool = False,
+    freeze: Sequence[str] = (),
     progress: Callable[[str], None] = lambda name: None,
     **options: Any,
 ) -> Iterator[Rung | Failure]:
     """Fit the laws of a comparison; yields each result or failure in their order, as soon as it is available.
 
-    Most of the time is needed for compiling, so several laws are fitted at the same time, each in its own thread.
+    Most of the time is needed for compiling, so several laws are fitted at the same time, each in its own thread. Where
+    the laws that predict best hold numbers in doubt, a simpler one made from them follows (`reduced`), unless they are
+    functions of the command.
 
     Arguments:
         laws: starts by name.
@@ -243,6 +202,7 @@ def fit_each(
         held_out: records to judge on, as in `compare`.
         rig: the test machine of all fits, as in `compare`.
         scheduled: whether the parameters are functions of the command, as in `compare`.
+        freeze: parameters to hold at their start, as in `fit`.
         progress: called with each name before its result is waited for.
         options: passed on to `fit`.
 
@@ -251,15 +211,18 @@ def fit_each(
     """
     if scheduled:
         runs = settings_stated(runs)
-    # A thread begins with the precision of the process, not with that of its caller.
-    double = jnp.result_type(float) == jnp.float64
 
-    def fitted(name: str, start: Start) -> Rung | Failure:
+    def fitted(name: str, start: Start, held: tuple[str, ...] = ()) -> Rung | Failure:
+        frozen = (*name_patterns("freeze", freeze), *held)
+        inputs = ("law", name, start, tuple(runs), tuple(held_out), scheduled, rig, frozen, options)
+        return piece(inputs, lambda: outcome(name, start, frozen))
+
+    def outcome(name: str, start: Start, frozen: tuple[str, ...]) -> Rung | Failure:
+        how = {"rig": rig, "freeze": frozen}
         try:
-            with jax.enable_x64(double):
-                by_setting = fit_scheduled(start, runs, rig=rig, progress=_silent, **options) if scheduled else None
-                result = by_setting.result if by_setting else fit(start, runs, rig=rig, **options)
-                judged = _judged(start, result, held_out, scheduled)
+            by_setting = fit_scheduled(start, runs, progress=lambda text: None, **how, **options) if scheduled else None
+            result = by_setting.result if by_setting else fit(start, runs, **how, **options)
+            judged = _judged(start, result, held_out, scheduled)
         except NUMERICAL as error:
             return Failure(name, str(error))
         own = (name, len(result.parameters), result.fit_percent, result.rmse)
@@ -267,14 +230,15 @@ def fit_each(
             return Rung(*own, None, None, result, result.scores, by_setting)
         return Rung(*own, judged.fit_percent, judged.rmse, result, judged.scores, by_setting, judged.words)
 
-    pool = ThreadPoolExecutor(max_workers=min(os.cpu_count() or 1, MOST_THREADS))
-    try:
-        waiting = {name: pool.submit(fitted, name, start) for name, start in laws.items()}
-        for name, outcome in waiting.items():
-            progress(name)
-            yield outcome.result()
-    finally:
-        pool.shutdown(cancel_futures=True)
+    def simpler(source: Rung, law: AbstractDamper, held: tuple[str, ...]) -> Rung | Failure:
+        return fitted(source.name, law, (*frozen_by(laws[source.name]), *held))
+
+    rungs = list[Rung]()
+    for one in side_by_side(fitted, laws, progress):
+        rungs += [one] if isinstance(one, Rung) else []
+        yield one
+    if rungs and not scheduled:
+        yield from reduced(rungs, simpler, progress)
 
 
 def _judged(start: Start, result: FitResult, held_out: Sequence[BenchRun], scheduled: bool) -> HeldOut | None:
@@ -282,8 +246,3 @@ def _judged(start: Start, result: FitResult, held_out: Sequence[BenchRun], sched
     if held_out:
         return on_records(result, held_out)
     return None if isinstance(start, AbstractTrainedStart) else without_parts(result, in_time=scheduled)
-
-
-def _silent(text: str) -> None:
-    """Shows nothing: laws are fitted side by side, each in its thread."""
-    del text

@@ -21,7 +21,7 @@ def contradicting(model: Model, runs: Sequence[BenchRun]) -> list[Contradiction]
     warms = law.traits().temperature_dependent or (rig is not None and "heat" in rig.effects())
     if warms and all(run.temperature is not None for run in runs):
         return []
-    return contradictions(runs, same_command=takes_command(law) and all(run.command is not None for run in runs))
+    return contradictions(runs, same_command=takes_command(law) and all(run.commands is not None for run in runs))
 
 
 def refuse_contradicting(found: Sequence[Contradiction], argument: str = "runs") -> None:

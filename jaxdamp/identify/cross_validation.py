@@ -9,11 +9,10 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
-from jaxdamp._results import AbstractResult, worst_status
+from jaxdamp._results import AbstractResult, drawn_by, worst_status
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp._traced import of_known_numbers
-from jaxdamp._types import Figure
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.identify.fitting import fit
 from jaxdamp.identify.law_result import AbstractFitted
@@ -142,11 +141,7 @@ class CrossValidation(AbstractResult):
     def __add__(self, other: "CrossValidation") -> "CrossValidation":
         return CrossValidation(self.folds + other.folds, self.inner + other.inner)
 
-    def plot(self, **options: Any) -> Figure:
-        """The fit of every held-out record, law by law."""
-        from jaxdamp.plots import cross_validation
-
-        return cross_validation(self, **options)
+    plot = drawn_by("cross_validation", "The fit of every held-out record, law by law.")
 
     def table(self) -> Table:
         """One row for each law: mean fit of the held-out records by group and over all records, and RMSE."""

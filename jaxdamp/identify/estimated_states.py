@@ -15,6 +15,7 @@ from jaxdamp.identify.initial_states import rest_window
 from jaxdamp.identify.model import Model, OnRig, RecordStart, law_of, marched, on_rig, rig_of, starts_in, state_history
 from jaxdamp.identify.traces import Batch, batches
 from jaxdamp.parameters import with_values
+from jaxdamp.rig import Followed
 
 
 SAMPLES_PER_CYCLE = 100  # of the motion that shows how large the states become
@@ -59,15 +60,15 @@ def first_states(model: Model, runs: Sequence[BenchRun]) -> FirstStates:
 @eqx.filter_jit
 def _first_states(batch: Batch, model: Model, start: Array, stop: Array, target: Array) -> tuple[Array, Array, Array]:
     def one(
-        dt: Array, x: Array, v: Array, warm: Array | None, values: dict[str, Array], start: Array, stop: Array, y: Array
+        dt: Array, x: Array, v: Array, followed: Followed, values: dict[str, Array], start: Array, stop: Array, y: Array
     ) -> tuple[State, State, State]:
         own = with_values(model, values)
-        history = state_history(own, dt, x, v, warm)
+        history = state_history(own, dt, x, v, followed)
         changes = jnp.where(jnp.arange(x.size)[:, None] < stop, jnp.abs(history - history[:1]), 0.0)
         size = jnp.max(changes, axis=0)
         size = jnp.where(size > 0, size, 1.0)
         rest, still = jnp.full(4, x[start]), jnp.zeros(4)
-        constant = None if warm is None else jnp.full(4, warm[0])
+        constant = jax.tree.map(lambda channel: jnp.full(4, channel[0]), followed)
 
         def force(state: State) -> Array:
             return marched(own, batch.effects, dt, rest, still, constant, 1, state)[0]
@@ -76,7 +77,7 @@ def _first_states(batch: Batch, model: Model, start: Array, stop: Array, target:
         at_rest = _states_with_force(force, expected, size, y)
         return expected, size, jnp.where(jnp.isfinite(y), at_rest, expected)
 
-    motion = (batch.dt, batch.stroke, batch.velocity, batch.temperature, batch.own_values(model))
+    motion = (batch.dt, batch.stroke, batch.velocity, batch.followed, batch.own_values(model))
     return jax.vmap(one)(*motion, start, stop, target)
 
 

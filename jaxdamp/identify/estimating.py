@@ -56,7 +56,7 @@ def estimate(problem: Problem, solution: Solution, noise: Noise) -> Estimates:
     """
     free, found = problem.free, solution.best
     uncertain, variance = uncertainty(found.jacobian, found.residual, noise), noise.variance
-    large = large_changes(free, found.values, np.linalg.norm(found.jacobian, axis=0) / problem.level)
+    large = large_changes(problem, found)
     of_start, sizes = _weakly_known(problem)
     large = np.where(of_start, sizes, large)
     sides, minima = at_ends(problem.coordinates, found.values), minima_of(solution, free.names, variance)
@@ -100,7 +100,7 @@ def undetermined(problem: Problem, found: SearchEnd) -> tuple[str, ...]:
     if not found.finite:
         return tuple(np.array(free.names)[of_law])
     covariance = uncertainty(found.jacobian, found.residual, noise_of(problem, found, None)).covariance
-    large = large_changes(free, found.values, np.linalg.norm(found.jacobian, axis=0) / problem.level)
+    large = large_changes(problem, found)
     weak = ~(np.sqrt(np.diag(covariance)) <= WEAK * large)
     return tuple(name for name, open_end in zip(free.names, weak & of_law, strict=True) if open_end)
 
@@ -144,21 +144,33 @@ def _estimates(
     return tuple(rows)
 
 
-def large_changes(
-    free: FreeParameters, values: Float[np.ndarray, " free"], sensitivity: Float[np.ndarray, " free"]
-) -> Float[np.ndarray, " free"]:
+def large_changes(problem: Problem, found: SearchEnd) -> Float[np.ndarray, " free"]:
     """A large change of each parameter: its value, or for parameters of either sign the change that moves F by its RMS.
 
+    A knot may move as far as its nearest neighbour, or the end of the records: where its place is not known better, the
+    slopes on both sides of it are equal to within their errors, and a curve without it describes the records as well.
+
     Arguments:
-        free: the free parameters.
-        values: their values.
-        sensitivity: RMS of the change of force per unit of each, relative to the RMS of the measured force.
+        problem: the problem that was minimised.
+        found: the minimum.
     """
-    lower, upper = free.limits()
-    tiny = np.finfo(float).tiny
-    signed = (lower < 0) & (upper > 0)
+    (lower, upper), tiny = problem.free.limits(), np.finfo(float).tiny
+    sensitivity = np.linalg.norm(found.jacobian, axis=0) / problem.level  # of the force, relative to its RMS
     by_force = np.divide(1.0, sensitivity, out=np.full(sensitivity.shape, tiny), where=sensitivity > 0)
-    return np.where(signed, by_force, np.maximum(np.abs(values), tiny))
+    by_size = np.maximum(np.abs(found.values), tiny)
+    return np.where(
+        problem.coordinates.ordered, _gaps(problem, found), np.where((lower < 0) & (upper > 0), by_force, by_size)
+    )
+
+
+def _gaps(problem: Problem, found: SearchEnd) -> Float[np.ndarray, " free"]:
+    """Distance of each number of an ordered vector from its nearest neighbour, at most the extent of the records."""
+    gaps, begin = _spans(problem.free, problem.reach), 0
+    for p in problem.free.chosen:
+        here = slice(begin, begin + p.value.size)
+        steps = np.diff(found.values[here], prepend=-np.inf, append=np.inf)
+        gaps[here], begin = np.minimum(gaps[here], np.minimum(steps[:-1], steps[1:])), here.stop
+    return gaps
 
 
 def _spans(free: FreeParameters, reach: Reach) -> Float[np.ndarray, " free"]:

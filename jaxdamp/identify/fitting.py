@@ -15,7 +15,6 @@ from jaxdamp._status import Status
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._triangles import triangle
 from jaxdamp.bench import BenchRun, RideRecord, as_runs, usable
-from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.contradicting import contradicting, refuse_contradicting
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, solve_by
 from jaxdamp.identify.judging import MOST_WARNINGS, input_noise_bias, judge, on_bias
@@ -34,7 +33,7 @@ from jaxdamp.identify.starting import Start
 from jaxdamp.identify.targets import TargetFit, fit_targets
 from jaxdamp.identify.vehicle_fitting import fit_vehicle
 from jaxdamp.identify.vehicle_result import VehicleFit
-from jaxdamp.parameters import FreeParameters, matched_in_words, parameters
+from jaxdamp.parameters import matched_in_words, parameters
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -138,10 +137,10 @@ def fit(
             their defaults are free, with these values as start, beside those of the law: `rig=Rig(gas_force=-100.0,
             force_delay=1e-3)` estimates a gas force and a delay. `freeze` the known ones (`"rig.moving_mass"`). Names
             of effects get their starts from the records: `rig=["gas", "friction", "delay"]`, out of offset, gas,
-            gas_stiffness, friction, mass, delay, lag, stroke_offset, heat. An offset or gas force named so is the whole
-            static force: a constant force of the law is held at zero, or zero at rest in a table, unless the call gives
-            it a value; it is left out beside a law with a static force of its own meaning, such as a gas charge. All
-            paths of parameters then begin with `law.` or `rig.`; their last parts stay the same.
+            gas_stiffness, friction, mass, delay, lag, command_lag, stroke_offset, heat. An offset or gas force named so
+            is the whole static force: a constant force of the law is held at zero, or zero at rest in a table, unless
+            the call gives it a value; it is left out beside a law with a static force of its own meaning, such as a gas
+            charge. All paths of parameters then begin with `law.` or `rig.`; their last parts stay the same.
         over: parameters of the law to fit, by path, last part of a path, or pattern; all if left out.
         freeze: parameters to hold at their start, named in the same way.
         bounds: extra limits `{name: (lower, upper)}` in the parameter's unit.
@@ -264,15 +263,11 @@ def solve(
     if solver is not None and not isinstance(solver, Solver):
         remedy = "For example `optimistix.Dogleg(rtol=1e-8, atol=1e-8)`."
         _checks.refuse("solver", "be a least-squares solver or minimiser of optimistix", solver, remedy)
-    rig = rig_of(problem.free.tree)
-    if solver is None and is_linear(problem.law, problem.free) and not (rig and "heat" in rig.effects()):
+    rig, free = rig_of(problem.free.tree), problem.free
+    linear = problem.law.traits().linear_in_parameters and all(p.linear and not p.domain.ordered for p in free.chosen)
+    if solver is None and linear and not (rig and "heat" in rig.effects()):  # which has a closed form
         return _solve_linear(problem)
     return search_from(problem, starts=starts, max_steps=max_steps, solver=solver)
-
-
-def is_linear(law: AbstractDamper, free: FreeParameters) -> bool:
-    """Whether the force is linear in all free parameters, so that the least squares have a closed form."""
-    return law.traits().linear_in_parameters and all(p.linear and not p.domain.ordered for p in free.chosen)
 
 
 def _solve_linear(problem: Problem) -> Solution:

@@ -33,19 +33,12 @@ Part = tuple[Bool[np.ndarray, " _"], ...]  # the samples of each record that are
 
 
 class HeldOut(NamedTuple):
-    """The errors on motion that a fit did not know.
+    """The errors on motion that a fit did not know."""
 
-    Attributes:
-        fit_percent: over all samples that were predicted [%].
-        rmse: over the same [N].
-        scores: on each record, or each part of a record, one by one.
-        words: what was predicted from what.
-    """
-
-    fit_percent: float
-    rmse: float  # N
-    scores: tuple[Score, ...]
-    words: str
+    fit_percent: float  # over all samples that were predicted [%]
+    rmse: float  # over the same [N]
+    scores: tuple[Score, ...]  # on each record, or each part of a record, one by one
+    words: str  # what was predicted from what
 
 
 def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None:
@@ -66,7 +59,7 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
     """
     evidence = result.evidence
     assert evidence is not None
-    problem, start = evidence.problem, _anchored_at(evidence)
+    problem, start = evidence.problem, anchored_at(evidence)
     fitted = np.flatnonzero(np.isfinite(problem.sigma))
     runs = [problem.runs[i] for i in fitted]
     groups = motions(runs)
@@ -164,7 +157,7 @@ def _kept(problem: Problem, fitted: Sequence[int] | np.ndarray, part: Part) -> F
     return factor
 
 
-def _anchored_at(evidence: Evidence) -> Problem:
+def anchored_at(evidence: Evidence) -> Problem:
     """The problem at its minimum, where numbers are weakly held: a large change counts as one standard deviation.
 
     It is a change by the value itself, if that is between half and all of what changes the force by its RMS.

@@ -20,6 +20,7 @@ RARE = 0.15  # share of the samples that show an effect below which this is the 
 FAST, SLOW = 0.8, 0.25  # of the largest velocity: above, or below, which an effect is one of fast or slow motion
 SPREAD = 0.8  # share of the velocities of the records that counts as all of them
 ALIKE = 0.1  # relative difference below which frequencies or amplitudes of records count as one
+NEEDLESS = "the curve hardly bends there", "Take one with fewer knots."
 
 
 class Effect(NamedTuple):
@@ -96,6 +97,7 @@ def on_identifiability(
         groups of which only a combination is.
     """
     shown, groups = effects(problem, found), _groups(estimates, directions)
+    knots = problem.coordinates.ordered
     noted, notes = [], []
     for i, (e, effect) in enumerate(zip(estimates, shown, strict=True)):
         unit = f" {e.unit}" if e.unit else ""
@@ -107,6 +109,7 @@ def on_identifiability(
             reason = _reason(effect, others)
             remedy = (effect and effect.remedy) or "Freeze it or add records that excite it."
             remedy = "It keeps the value that is expected from the motion." if e.name.startswith(STARTS) else remedy
+            reason, remedy = NEEDLESS if knots[i] else (reason, remedy)
             notes.append(
                 f"{e.name} is not identifiable from these records ({plus_minus(e.value, e.standard_error)}{unit})"
                 + f": {reason}" * bool(reason)

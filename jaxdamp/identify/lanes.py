@@ -83,7 +83,8 @@ class Lanes(NamedTuple):
         count, size = y.shape[0], y.shape[1] + 1
         products, margins, slopes = np.zeros((count, size, size)), np.zeros((count, 0)), np.zeros((count, 0, size - 1))
         for number, group in enumerate(self.groups):
-            lane, record = self._pairs(group, lanes)
+            # each record of a group with each of these lanes of its damper
+            lane, record = np.nonzero(self.damper[lanes][:, None] == group.damper[None, :])
             for part, (sums, of_law, by_y, *_) in self._chunks(group, y, lane, record):
                 if not number and not part.start and of_law.shape[1]:
                     margins, slopes = np.zeros((count, of_law.shape[1])), np.zeros((count, *by_y.shape[1:]))
@@ -132,11 +133,6 @@ class Lanes(NamedTuple):
         for group in self.groups:
             np.add.at(counts, group.damper, np.count_nonzero(np.asarray(group.batch.weight) > 0, axis=1))
         return counts
-
-    def _pairs(self, group: Group, lanes: Int[np.ndarray, " some"]) -> tuple[np.ndarray, np.ndarray]:
-        """Each record of a group with each of these lanes of its damper: the place of the lane, and the record."""
-        place, record = np.nonzero(self.damper[lanes][:, None] == group.damper[None, :])
-        return place, record
 
     def _chunks(
         self, group: Group, y: np.ndarray, lane: np.ndarray, record: np.ndarray
@@ -199,7 +195,7 @@ def _compared(
     shape, static_shape, others = structure
     coordinates, batch = eqx.combine(jax.tree.unflatten(shape, arrays), jax.tree.unflatten(static_shape, others))
     free = coordinates.free
-    fields = ("dt", "stroke", "velocity", "force", "weight", "number", "fixed", "temperature", "cycle")
+    fields = ("dt", "stroke", "velocity", "force", "weight", "number", "fixed", "temperature", "command", "cycle")
     rows = {name: jax.tree.map(lambda a: a[record][:, None], getattr(batch, name)) for name in fields}
 
     def compared(y: Array, row: dict[str, Any], level: Array) -> dict[str, Array]:

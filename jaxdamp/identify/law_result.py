@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
-from jaxdamp._tables import Table, plain, with_unit
+from jaxdamp._tables import Contents, Table, plain, with_unit
 from jaxdamp._types import Figure, VectorLike
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper
@@ -97,7 +97,7 @@ class AbstractFitted(AbstractResult):
         runs = as_runs(runs)
         return score(self.model_of(runs), runs, initial_state=self.initial_state)
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """Law, errors and scores as plain data.
 
         The law itself is written by `export.to_json`.
@@ -175,7 +175,7 @@ class FitResult(AbstractFitted, Fit):
         """
         return band(self._evidence, self.law, np.asarray(velocities, float))
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """Law, errors, scores and parameters as plain data."""
         return AbstractFitted.content(self) | Fit.content(self) | {"error_shares": plain(self.error_shares._asdict())}
 

@@ -103,12 +103,8 @@ def left_out(problem: Problem, best: SearchEnd) -> list[str]:
         not static and repeated > 0 and left > max(OF_THE_LAW * repeated, sure)
     ):
         return [*of_clock, _of_the_law(named, left / repeated if repeated > 0 else 1.0), *of_mains]
-    return [*of_clock, *map(_of_the_machine, named), *of_mains]
-
-
-def _of_the_machine(found: _Named) -> str:
-    look = found.words.format("of the squared residual look")
-    return f"{look}, which the fit leaves out: {found.effect.remedy}."
+    looks = ((one.words.format("of the squared residual look"), one.effect.remedy) for one in named)
+    return [*of_clock, *(f"{look}, which the fit leaves out: {remedy}." for look, remedy in looks), *of_mains]
 
 
 def _of_the_law(named: Sequence[_Named], left: float) -> str:

@@ -27,6 +27,7 @@ OFFSET = "offset"  # the machine of a comparison of laws: the least that any loa
 NEAR_REST = 0.1  # velocity, relative to its peak, below which the force shows gas, offset and springs
 SMALL = 1e-3  # of the force: a start that is nearly zero
 CALL = 'fit(law, runs, rig=["gas", "delay"])'
+COMMAND_LAG = 5e-3  # s, start of the lag of an actuator: coils and valves have 2 to 20 ms
 LARGE = 0.02  # of the standard deviation of the force, above which a static force is said
 
 
@@ -51,6 +52,7 @@ EFFECTS: dict[str, _Start] = {
     "mass": lambda r: {"moving_mass": 0.01 * r.force / r.acceleration},
     "delay": lambda r: {"force_delay": min(r.lag, 2e-3)},
     "lag": lambda r: {"force_lag": min(r.lag, 2e-3)},
+    "command_lag": lambda _: {"command_lag": COMMAND_LAG},
     "stroke_offset": lambda r: {"stroke_offset": 1e-4},
     "heat": lambda r: (
         {"temperature_slope": 2e-3} | ({} if r.measured_temperature else {"heating": 2e-3, "cooling": 2e-3})
@@ -88,29 +90,46 @@ def started_machine(rig: Machine, runs: Sequence[BenchRun]) -> Rig | None:
         return None
     if not isinstance(rig, Rig) and (isinstance(rig, str) or all(isinstance(name, str) for name in rig)):
         names = machine_names("rig", rig)
+        refuse_lag_of_held("command_lag" in names, runs)
         shown = _shown(runs) if names else None
         starts = [EFFECTS[name](shown) for name in names] if shown else []
         return Rig(**{field: value for start in starts for field, value in start.items()}) if starts else None
     check_module("rig", rig, (Rig,), CALL)
     assert isinstance(rig, Rig)
+    refuse_lag_of_held("command_lag" in free_fields(rig), runs)
     if not free_fields(rig):
         remedy = f"Give the numbers to be fitted a start, name effects as in `{CALL}`, or leave `rig` out."
         _checks.refuse("rig", "have a number that is not at its default", "one that adds nothing", remedy)
     return rig
 
 
-class Beginning(NamedTuple):
-    """A law to start from and the machine beside it.
+def without_command_lag(rig: Machine) -> tuple[Machine, float]:
+    """The machine as it was asked for, but without a lag of the actuator; and the start of this lag [s], 0 if none."""
+    if isinstance(rig, Rig):
+        held = dataclasses.replace(rig, command_lag=0.0)
+        return (held if free_fields(held) else None), float(rig.command_lag)
+    names = machine_names("rig", rig or ())
+    return [name for name in names if name != "command_lag"], COMMAND_LAG * ("command_lag" in names)
 
-    Attributes:
-        law: the law.
-        rig: the machine.
-        held: paths of the constant forces in the law, which are zero since the machine has the static force.
+
+def refuse_lag_of_held(asked: bool, runs: Sequence[BenchRun]) -> None:
+    """Refuse a lag of the actuator where no record has a command that varies.
+
+    Arguments:
+        asked: whether the lag was asked for.
+        runs: the records.
     """
+    if asked and all(run.command_channel is None for run in runs):
+        remedy = "Record the command as a channel, `BenchRun.command_channel`, or leave the lag out."
+        _checks.refuse("rig", "have no `command_lag` beside commands that are held", "one with it", remedy)
+
+
+class Beginning(NamedTuple):
+    """A law to start from and the machine beside it."""
 
     law: AbstractDamper
     rig: Rig | None
-    held: tuple[str, ...] = ()
+    held: tuple[str, ...] = ()  # paths of constant forces of the law, zero since the machine has the static force
 
 
 def started_on(law: Start, runs: Sequence[BenchRun], rig: Machine, named: Iterable[str] = ()) -> Beginning:
@@ -280,3 +299,8 @@ def static_force_in_words(result: FitResult, runs: tuple[BenchRun, ...]) -> list
         " It is in `result.rig`, not in the law, so that a ride, a table or exported code is without it. Read the load"
         f" cell without the damper; `law + dampers.Spring(0.0, {offset:.0f})` is the damper if it is gas."
     ]
+
+
+def held_constant_forces(law: AbstractDamper, machine: Rig | None) -> list[str]:
+    """The constant forces of a law that stay zero, since the machine, if there is one, has the static force."""
+    return [] if machine is None else [path for path in constant_forces(law) or [] if float(get(law, path)) == 0.0]

@@ -186,12 +186,13 @@ class ManyFits(AbstractResult):
             if share > LEFT_OUT + float(np.median(self.share_left_out)):
                 texts[i].append(f"{100.0 * share:.2g} % of its samples have less than half weight")
         for j, name in enumerate(self.parameters):
-            expected, scores = self._expected(j)
-            apart = np.abs(self.values[:, j] - expected)
+            values = self.values[:, j]
+            expected, scores = _trend(values, self.settings), _robust_scores(values, self.settings)
+            apart = np.abs(values - expected)
             sure = (np.abs(scores) > OUTLYING) & (apart > CERTAIN * self.standard_errors[:, j])
             for i in np.flatnonzero(sure):
                 unit = f" {self.free.owners[j].unit}".rstrip()
-                texts[i].append(f"{name} = {self.values[i, j]:.4g}{unit} where the others suggest {expected[i]:.4g}")
+                texts[i].append(f"{name} = {values[i]:.4g}{unit} where the others suggest {expected[i]:.4g}")
         return tuple("; ".join(text) for text in texts)
 
     @property
@@ -257,13 +258,6 @@ class ManyFits(AbstractResult):
         worst = int(np.argmax(errors))
         alone = len(errors) > 1 and errors[worst] > ONE_RECORD * np.median(np.delete(errors, worst))
         return f", mostly of {self.records[i][worst].name!r} with an RMSE of {errors[worst]:.3g} N" if alone else ""
-
-    def _expected(self, j: int) -> tuple[np.ndarray, np.ndarray]:
-        """What the other dampers suggest for a number of each, and by how many deviations it differs."""
-        values = self.values[:, j]
-        scores = _robust_scores(values, self.settings)
-        trend = _trend(values, self.settings)
-        return trend, scores
 
 
 def _trend(values: np.ndarray, settings: tuple[float, ...] | None) -> np.ndarray:

@@ -13,8 +13,8 @@ from jaxdamp._types import Scalar, State, Vector
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, FittedRange, with_fitted_range, without_standard_errors
 from jaxdamp.identify.initial_states import Cycle, periodic_state
-from jaxdamp.parameters import FreeParameters, Module, check_parameters, parameter, readable
-from jaxdamp.rig import Rig, Sensor, march
+from jaxdamp.parameters import AbstractDeclared, FreeParameters, Module, parameter, readable
+from jaxdamp.rig import Followed, Rig, Sensor, march
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -50,7 +50,7 @@ Model = AbstractDamper | OnRig
 
 
 @final
-class InitialMotion(Module):
+class InitialMotion(AbstractDeclared):
     """How a record begins: displacements and rates of all coordinates, beside rest on the first heights.
 
     Arguments:
@@ -60,9 +60,6 @@ class InitialMotion(Module):
 
     position: Vector = parameter("", "displacement of a coordinate at the first sample, in m or rad")
     rate: Vector = parameter("", "rate of a coordinate at the first sample, in m/s or rad/s")
-
-    def __check_init__(self) -> None:
-        check_parameters(self)
 
 
 @final
@@ -171,30 +168,22 @@ def marched(
     dt: Array,
     stroke: Float[Array, " time"],
     velocity: Float[Array, " time"],
-    temperature: Float[Array, " time"] | None,
+    followed: Followed,
     substeps: int,
     state: State | None,
 ) -> Float[Array, " time"]:
     """Force [N] in a record with this motion, for use inside compiled functions, from this state if one is given."""
     law, rig = law_of(model), rig_of(model)
     if rig is None:
-        return march(law, dt, stroke, velocity, substeps, temperature, state)
-    return rig.march(law, effects, dt, stroke, velocity, temperature, substeps, state).force
-
-
-def law_in(model: Model, temperature: Float[Array, " time"] | None) -> AbstractDamper:
-    """The law in a record, with its oil at the first temperature of the record where it depends on one."""
-    law = law_of(model)
-    if temperature is None or not law.traits().temperature_dependent:
-        return law
-    return law.at_temperature(temperature[0])
+        return march(law, dt, stroke, velocity, substeps, followed, state)
+    return rig.march(law, effects, dt, stroke, velocity, followed, substeps, state).force
 
 
 def state_history(
-    model: Model, dt: Array, stroke: Float[Array, " time"], velocity: Float[Array, " time"], temperature: Array | None
+    model: Model, dt: Array, stroke: Float[Array, " time"], velocity: Float[Array, " time"], followed: Followed
 ) -> Float[Array, "time states"]:
-    """The states of the law at every sample of a motion [m, m/s] that begins at rest."""
-    law = law_in(model, temperature)
+    """The states of the law at every sample of a motion [m, m/s] that begins at rest, under what is measured first."""
+    law = followed.first(law_of(model))
 
     def step(state: State, ends: tuple[Array, Array, Array, Array]) -> tuple[State, State]:
         x0, v0, x1, v1 = ends
@@ -206,9 +195,7 @@ def state_history(
     return jnp.concatenate([begin[None], jax.lax.scan(step, begin, ends)[1]])
 
 
-def initial_state(
-    model: Model, effects: tuple[str, ...], cycle: Cycle, temperature: Float[Array, " time"] | None
-) -> tuple[State, Scalar]:
+def initial_state(model: Model, effects: tuple[str, ...], cycle: Cycle, followed: Followed) -> tuple[State, Scalar]:
     """The states at the start of a record: periodic, or at rest; and how much they still change over the cycle."""
     rig = rig_of(model)
     if rig is not None:
@@ -216,7 +203,7 @@ def initial_state(
         stroke, velocity = rig.delayed_motion(effects, cycle.dt, *before)
         again = -cycle.stroke.size
         cycle = cycle._replace(stroke=stroke[again:] - rig.stroke_offset, velocity=velocity[again:])
-    law = law_in(model, temperature)
+    law = followed.first(law_of(model))
     state, change = periodic_state(law, cycle)
     return jnp.where(cycle.periodic, state, law.initial_state()), jnp.where(cycle.periodic, change, 0.0)
 
@@ -235,7 +222,7 @@ def covered_range(runs: Sequence[BenchRun]) -> FittedRange:
     channels = {name: [getattr(run, name) for run in runs] for name in ("velocity", "stroke", "force")}
     channels["frequency"] = [np.array([run.frequency]) for run in runs]
     channels["temperature"] = [run.temperature for run in runs if run.temperature is not None]
-    channels["command"] = [np.array([run.command]) for run in runs if run.command is not None]
+    channels["command"] = [run.commands for run in runs if run.commands is not None]
     joined = {name: np.concatenate(values) for name, values in channels.items() if values}
     limits = {name: (float(values.min()), float(values.max())) for name, values in joined.items()}
     return FittedRange(**limits)

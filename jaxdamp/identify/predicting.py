@@ -16,7 +16,7 @@ from jaxdamp.identify.estimated_states import with_first_states
 from jaxdamp.identify.initial_states import DRIFT, rest_window, start_of
 from jaxdamp.identify.model import Model, blind_end, initial_state_for, is_memoryless, law_of, of_record, starts_in
 from jaxdamp.identify.printed import predicted as predicted_by_c
-from jaxdamp.identify.rows import samples_in_block, settling_time
+from jaxdamp.identify.rows import samples_in_block, settling_samples
 from jaxdamp.identify.traces import Batch, batches
 
 
@@ -108,7 +108,7 @@ def _first_used(model: Model, run: BenchRun, initial_state: str) -> int:
         if rest_window(run):
             return rest_window(run)
         start = "warm_up"
-    return int(np.ceil(settling_time(run) * run.sampling_rate)) if start == "warm_up" else 0
+    return settling_samples(run, 1.0 / run.sampling_rate) if start == "warm_up" else 0
 
 
 class Score(NamedTuple):
@@ -153,17 +153,11 @@ def fit_percent(measured: Sequence[np.ndarray], predicted: Sequence[np.ndarray])
 
 
 class Compared(NamedTuple):
-    """The samples of a record, or of a part of one, over which a prediction is compared with the measurement.
+    """The samples of a record, or of a part of one, over which a prediction is compared with the measurement."""
 
-    Attributes:
-        name: of the record or part.
-        measured: forces [N].
-        predicted: forces at the same samples [N].
-    """
-
-    name: str
-    measured: Float[np.ndarray, " samples"]
-    predicted: Float[np.ndarray, " samples"]
+    name: str  # of the record or part
+    measured: Float[np.ndarray, " samples"]  # forces [N]
+    predicted: Float[np.ndarray, " samples"]  # forces at the same samples [N]
 
 
 def compared(

@@ -30,7 +30,7 @@ from jaxdamp.identify.model import (
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.identify.traces import batches, owners, places
-from jaxdamp.parameters import free_parameters, match_paths, name_patterns, parameters, with_values
+from jaxdamp.parameters import free_parameters, match_paths, matching, name_patterns, parameters, with_values
 
 
 FIT_OUTSIDE = "Call it outside `jax.jit`, `jax.grad` and `jax.vmap`; the residuals of a `Problem` can be traced."
@@ -98,6 +98,7 @@ def prepare(
     if initial_state == "estimated":
         model, expected, unfitted = _with_estimated_states(model, runs, sigma)
         absent = [*absent, *unfitted]
+    _refuse_two_readings(model, freeze=freeze, per_record=per_record, over=over, bounds=bounds, priors=priors, tie=tie)
     own = _per_record(model, per_record, sigma, absent)
     frozen = [*name_patterns("freeze", freeze), *frozen_by(law), *absent, *not_chosen(model, over, "rig.", STARTS)]
     free = free_parameters(_spread(model, own, len(runs)), freeze=frozen, bounds=bounds, tie=tie)
@@ -133,6 +134,22 @@ def _with_estimated_states(
     mean, deviation = (jnp.asarray(a[fitted]) for a in (states.expected, states.size))
     prior = Priors(tuple(map(str, paths[fitted])), mean, deviation, mean.size, jnp.ones(()), weak=True)
     return on_rig(law_of(model), rig_of(model), starts), (prior,), [str(path) for path in paths[~fitted]]
+
+
+def _refuse_two_readings(model: Model, **given: Iterable[str] | None) -> None:
+    """Refuse a pattern such as "law.*" that beside a machine stands for other numbers than for the law alone.
+
+    All paths of a law on a machine begin with "law.", as do those of a law in a wrapper by themselves.
+    """
+    law = law_of(model)
+    beside, alone = ([p.path for p in parameters(tree)] for tree in (model, law))
+    for argument, patterns in given.items() if law is not model else ():
+        for pattern in [patterns] if isinstance(patterns, str) else patterns or ():
+            long, short = matching(beside, pattern), [f"law.{path}" for path in matching(alone, pattern)]
+            if "*" in pattern and pattern.startswith("law.") and short and long != short:
+                remedy = f"It is {', '.join(short)} of the law, but {', '.join(long)} beside a machine, where all paths"
+                remedy += ' of the law begin with "law.". Write the names that you mean.'
+                _checks.refuse(argument, "be patterns with one meaning", repr(pattern), remedy)
 
 
 def not_chosen(model: Model | VehicleTest, over: Sequence[str] | None, *beside: str) -> list[str]:

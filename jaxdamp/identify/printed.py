@@ -2,8 +2,8 @@
 
 One function for each structure of a law serves records of any number and length, every start, and predictions. What it
 cannot compute is computed by XLA, with the same numbers: a machine with delay, lag, mass or heat, a measured
-temperature, periodic or estimated initial states, single precision, or where no C compiler is at hand; the log says so
-once for each reason.
+temperature, a command that varies, periodic or estimated initial states, single precision, or where no C compiler is
+at hand; the log says so once for each reason.
 """
 
 import dataclasses
@@ -38,6 +38,8 @@ def _refusal(parts: Sequence[object], model: PyTree) -> str:
             return f"a machine with {', '.join(part.effects)}"
         if part.temperature is not None:
             return "a measured temperature"
+        if part.command is not None:
+            return "a command that varies"
         if part.cycle is not None:
             return "periodic initial states"
         if any(leaf.dtype != np.float64 for leaf in (part.stroke, part.force)):
@@ -157,7 +159,8 @@ def evaluator(free: FreeParameters, residuals: Sequence[AbstractResiduals]) -> E
     """The residuals of records as printed C; None where XLA computes them."""
     batches = [part for part in residuals if isinstance(part, Batch)]
     reason = _refusal(residuals, free.tree)
-    if not reason and free_has_conditions(free) and any(batch.per_record for batch in batches):
+    conditions = any(law.has_conditions() for _, law in laws_inside(free.tree))
+    if not reason and conditions and any(batch.per_record for batch in batches):
         reason = "a value for each record beside conditions"
     if reason:
         say(f"Computed by XLA: {reason}.")
@@ -166,9 +169,11 @@ def evaluator(free: FreeParameters, residuals: Sequence[AbstractResiduals]) -> E
     model = free.build(free.values)  # with the values that are tied to others
     places, rows, offset, first = [], [], 0, None
     for batch in batches:
+        # values that the records state take no free number
+        mine = with_values(taken_tree, {path: np.asarray(-1.0) for path in batch.fixed})
         for row, record in enumerate(_records(batch)):
             numbers = numbers_on_rig(_of_row(batch, model, row))
-            marked = _of_row(dataclasses.replace(batch, fixed={}), _marked(taken_tree, batch), row)
+            marked = _of_row(dataclasses.replace(batch, fixed={}), mine, row)
             taken = numbers_on_rig(marked, _blank(plain_rig()))
             first = first or numbers
             places.append({i for i, array in enumerate(taken.arrays) if np.any(array >= 0)})
@@ -187,13 +192,3 @@ def _taken(free: FreeParameters) -> PyTree:
     numbers = free.split(np.arange(float(free.values.size)))
     numbered = dict(zip((p.path for p in free.chosen), numbers, strict=True))
     return with_values(_blank(free.tree), numbered | {path: numbered[leader] for path, leader in free.ties})
-
-
-def _marked(taken: PyTree, batch: Batch) -> PyTree:
-    """Values that the records state take no free number."""
-    return with_values(taken, {path: np.asarray(-1.0) for path in batch.fixed})
-
-
-def free_has_conditions(free: FreeParameters) -> bool:
-    """Whether a law has conditions between its parameters."""
-    return any(law.has_conditions() for _, law in laws_inside(free.tree))

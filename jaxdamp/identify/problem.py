@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float, Int, PyTree
 
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import Reach, laws_inside, margins
@@ -19,6 +19,7 @@ from jaxdamp.solve import BoundedLevenbergMarquardt, ImplicitWithinBounds
 
 
 ROUNDING = 1e-8  # residual, relative to the force, below which there is nothing left to explain
+SENSORS = "sensors."  # with which the paths of numbers begin that act on channels after a simulation
 
 
 class AbstractResiduals(eqx.Module):
@@ -27,6 +28,13 @@ class AbstractResiduals(eqx.Module):
     @abstractmethod
     def __call__(self, model: Any) -> Float[Array, " samples"]:
         """Weighted difference between model and measurement; zero for samples that are not used."""
+
+    def observed(self, model: PyTree) -> PyTree:
+        """What of the residuals a simulation gives, whatever the sensors add; nothing where none is needed."""
+
+    def compared(self, model: PyTree, observed: PyTree) -> Float[Array, " samples"]:
+        """The residuals from what `observed` gives and the sensors of the model."""
+        return self(model)
 
     @abstractmethod
     def used(self) -> Bool[np.ndarray, " samples"]:
@@ -271,12 +279,37 @@ jax.tree_util.register_pytree_node(
 def linearised(
     free: FreeParameters, values: Float[Array, " free"], residuals: Sequence[AbstractResiduals]
 ) -> tuple[Float[Array, " samples"], Float[Array, "samples free"]]:
-    """All residuals and their Jacobian with respect to the physical values, in one forward pass."""
+    """All residuals and their Jacobian with respect to the physical values, in one forward pass.
 
-    def both(values: Array) -> tuple[Array, Array]:
-        model = free.build(values)
-        together = jnp.concatenate([part(model) for part in residuals])
-        return together, together
+    Derivatives by the numbers of sensors need no simulation: they are taken apart, with what the simulation gave.
+    """
+    later = np.array([_acts_later(free, p.path) for p in free.owners], bool)
+    later &= not later.all()  # where nothing else is free there is nothing to be gained
+    first, last = np.flatnonzero(~later), np.flatnonzero(later)
 
-    jacobian, together = jax.jacfwd(both, has_aux=True)(values)
-    return together, jacobian
+    def simulated(own: Array) -> tuple[Array, tuple[Array, list[PyTree]]]:
+        model = free.build(values.at[first].set(own) if last.size else own)
+        observed = [part.observed(model) for part in residuals]
+        together = _together(residuals, model, observed)
+        return together, (together, observed)
+
+    jacobian, (together, observed) = jax.jacfwd(simulated, has_aux=True)(values[first] if last.size else values)
+    if not last.size:
+        return together, jacobian
+
+    def sensed(own: Array) -> Array:
+        moved = free.build(values.at[last].set(own))
+        return _together(residuals, dataclasses.replace(free.build(values), sensors=moved.sensors), observed)
+
+    both = jnp.concatenate([jacobian, jax.jacfwd(sensed)(values[last])], axis=1)
+    return together, both[:, np.argsort(np.concatenate([first, last]))]
+
+
+def _acts_later(free: FreeParameters, path: str) -> bool:
+    """Whether a free number, and all that are tied to it, act on channels after the simulation."""
+    return all(one.startswith(SENSORS) for one in (path, *[tied for tied, leader in free.ties if leader == path]))
+
+
+def _together(residuals: Sequence[AbstractResiduals], model: PyTree, observed: Sequence[PyTree]) -> Array:
+    parts = zip(residuals, observed, strict=True)
+    return jnp.concatenate([part.compared(model, own) for part, own in parts])

@@ -25,23 +25,16 @@ Values = Float[np.ndarray, " samples"]
 
 
 class Pattern(NamedTuple):
-    """What an effect leaves in the residual, and what it means.
+    """What an effect leaves in the residual, and what it means."""
 
-    Attributes:
-        name: of the effect.
-        signals: weighted force for a unit of each of its numbers.
-        signed: whether its numbers may have either sign.
-        words: what it is, with its numbers.
-        remedy: what to do.
-        at_rest: force [N] at velocity zero for a unit of each number; None where that says nothing.
-    """
-
-    name: str
-    signals: Float[np.ndarray, "samples numbers"]
-    signed: bool
-    words: Callable[[np.ndarray], str]
-    remedy: str
-    at_rest: np.ndarray | None = None
+    name: str  # of the effect
+    signals: Float[np.ndarray, "samples numbers"]  # weighted force for a unit of each of its numbers
+    signed: bool  # whether its numbers may have either sign
+    words: Callable[[np.ndarray], str]  # what it is, with its numbers
+    remedy: str  # what to do
+    at_rest: np.ndarray | None = (
+        None  # force [N] at velocity zero for a unit of each number; None where it says nothing
+    )
 
 
 class Motion(NamedTuple):
@@ -55,21 +48,13 @@ class Motion(NamedTuple):
 
 
 class Record(NamedTuple):
-    """The samples of a fitted record in the residuals.
+    """The samples of a fitted record in the residuals."""
 
-    Attributes:
-        number: of the record.
-        at: places among the used samples.
-        weight: of each sample.
-        motion: of the record there.
-        cycle: samples in a period; 0 where the record is shorter than two.
-    """
-
-    number: int
-    at: np.ndarray
-    weight: Values
-    motion: Motion
-    cycle: int
+    number: int  # of the record
+    at: np.ndarray  # places among the used samples
+    weight: Values  # of each sample
+    motion: Motion  # of the record there
+    cycle: int  # samples in a period; 0 where the record is shorter than two
 
 
 def records_of(problem: Problem, best: SearchEnd) -> Iterator[Record]:
@@ -126,7 +111,13 @@ def proportional(problem: Problem, records: Sequence[Record]) -> list[Pattern]:
     """
     machine = 'add "{}" to the machine (`rig`)'
     kinds: list[tuple[str, bool, str, str, Callable[[Motion], Values]]] = [
-        ("offset", True, "a constant force of {:.3g} N", f'add "gas" or {machine.format("offset")[4:]}', _one),
+        (
+            "offset",
+            True,
+            "a constant force of {:.3g} N",
+            f'add "gas" or {machine.format("offset")[4:]}',
+            lambda motion: np.ones_like(motion.time),
+        ),
         (
             "gas_stiffness",
             False,
@@ -172,10 +163,6 @@ def proportional(problem: Problem, records: Sequence[Record]) -> list[Pattern]:
         for name, signed, words, remedy, change in kinds
     ]
     return [*patterns, *_gains(problem, records), _curve(records)]
-
-
-def _one(motion: Motion) -> Values:
-    return np.ones_like(motion.time)
 
 
 def _heated(motion: Motion) -> Values:

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from jaxdamp._results import AbstractResult, Derived
 from jaxdamp._status import Status
-from jaxdamp._tables import Table, plain
+from jaxdamp._tables import Contents, Table, plain
 from jaxdamp.identify.bayes import Posterior, posterior
 from jaxdamp.identify.estimates import Estimate, Minimum, describe, parameter_table, rounded
 from jaxdamp.identify.profile import ProfileCurve, profile_curve
@@ -84,14 +84,15 @@ class Fit(AbstractModelResult):
         return propagate(self._evidence, function, samples, seed)
 
     def profile(self, name: str) -> ProfileCurve:
-        """The cost of other values of a parameter, all others fitted again, and its 95 % interval; `.plot()` shows it.
+        """The cost of other values of a parameter, all others fitted again, and its 95 % interval; its `plot` shows it.
 
         Unlike the standard error it is valid where the sum of squares is no parabola.
 
         Arguments:
-            name: as in `parameters`.
+            name: as in `parameters`, or its end, as in `estimate`.
         """
-        return profile_curve(self._evidence, name, self.estimate(name).interval)
+        parameter = self.estimate(name)
+        return profile_curve(self._evidence, parameter.name, parameter.interval)
 
     def posterior(self, *, samples: int = 1000, warm_up: int = 500, chains: int = 2, seed: int = 0) -> Posterior:
         """The full posterior of the parameters, by the no-U-turn sampler of numpyro (`pip install 'jaxdamp[bayes]'`).
@@ -127,7 +128,7 @@ class Fit(AbstractModelResult):
         table, parameters = self.table(), self.parameters_table()
         return {"table": table} if table == parameters else {"table": table, "parameters": parameters}
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """Parameters and their covariance as plain data, and what was minimised in words."""
         return {
             **{name: words for name in ("criterion", "patterns") if (words := getattr(self, name))},

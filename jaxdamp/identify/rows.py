@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool
 
+from jaxdamp import _checks
 from jaxdamp.bench import BenchRun
 from jaxdamp.identify.initial_states import Cycle, moving_samples, repeated_motion, start_of
 from jaxdamp.identify.model import Model, blind_end, law_of
@@ -20,7 +21,7 @@ class Row(NamedTuple):
     """A record made ready for a model with memory."""
 
     dt: float
-    signals: list[np.ndarray]  # stroke, velocity, force, and the temperature if it is used
+    signals: list[np.ndarray]  # stroke, velocity, force, and temperature and command if they are used
     weight: np.ndarray
     number: int
     warm_up: int
@@ -46,9 +47,22 @@ def dominant_rate(run: BenchRun) -> float:
     return _rates[run]
 
 
+def refuse_units(runs: Sequence[BenchRun]) -> None:
+    """Refuse commands in several units."""
+    units = {run.command_unit for run in runs if run.command_channel is not None}
+    if len(units) > 1:
+        named = ", ".join(f"{run.name} in {run.command_unit or 'none'}" for run in runs if run.command_unit in units)
+        _checks.refuse("runs", "have their commands in one unit", named, "Fit those with one unit.")
+
+
 def settling_time(run: BenchRun) -> float:
     """Settling time [s] at the start of a record, half a cycle, after which the initial states no longer matter."""
     return min(np.pi / dominant_rate(run), 0.25 * run.duration)
+
+
+def settling_samples(run: BenchRun, dt: float) -> int:
+    """Samples, `dt` [s] apart, of the settling time; a whole number of them stays one however it is rounded."""
+    return int(np.ceil(settling_time(run) / dt - 1e-6))
 
 
 def _with_warm_up(run: BenchRun, count: int, channels: Sequence[str]) -> list[np.ndarray]:
@@ -59,13 +73,19 @@ def _with_warm_up(run: BenchRun, count: int, channels: Sequence[str]) -> list[np
     stroke, velocity = (np.interp(instants, since, values) for values in (run.stroke, run.velocity))
     stroke = stroke + run.stroke[0] - np.interp(period, since, run.stroke)
     before = {"stroke": stroke, "velocity": velocity, "force": np.zeros(count)}
-    if "temperature" in channels and run.temperature is not None:
-        before["temperature"] = np.full(count, run.temperature[0])
-    return [np.concatenate([before[channel], getattr(run, channel)]) for channel in channels]
+    before |= {name: np.full(count, channel(run, name)[0]) for name in channels[3:]}
+    return [np.concatenate([before[name], channel(run, name)]) for name in channels]
+
+
+def channel(run: BenchRun, name: str) -> np.ndarray:
+    """A channel of a record, the command at every sample among them."""
+    return getattr(run, "commands" if name == "command" else name)
 
 
 def samples_in_block(run: BenchRun, samples_per_cycle: int | None) -> int:
-    """How many samples of a record are averaged."""
+    """How many samples of a record are averaged; none where the command varies, which is faster than the motion."""
+    if run.command_channel is not None:
+        return 1
     cycle = 2 * np.pi * run.sampling_rate / dominant_rate(run)
     return 1 if samples_per_cycle is None else max(int(cycle / samples_per_cycle), 1)
 
@@ -101,7 +121,7 @@ def row_of(
         signals[0][:warm_up], signals[1][:warm_up] = repeated(np.arange(-warm_up, 0) * dt)
     weight = np.full(len(signals[0]), np.sqrt(block) / sigma)
     weight[len(weight) - blind_end(model, dt) :] = 0.0
-    weight[: warm_up + (int(np.ceil(settling_time(run) / dt)) if start == "warm_up" else 0)] = 0.0
+    weight[: warm_up + (settling_samples(run, dt) if start == "warm_up" else 0)] = 0.0
     if not can_rest:
         weight[warm_up:][resting_blocks(run, block)] = 0.0
     return Row(dt, signals, weight, number, warm_up, block, substeps, repeated)

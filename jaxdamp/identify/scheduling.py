@@ -22,7 +22,7 @@ from jaxdamp.identify.contradicting import refuse_contradicting
 from jaxdamp.identify.estimating import undetermined
 from jaxdamp.identify.fitting import fit, solve
 from jaxdamp.identify.law_result import FitResult
-from jaxdamp.identify.machine import OFFSET, Machine, constant_forces
+from jaxdamp.identify.machine import OFFSET, Machine, held_constant_forces, refuse_lag_of_held, without_command_lag
 from jaxdamp.identify.model import law_of, rig_of
 from jaxdamp.identify.predicting import score
 from jaxdamp.identify.preparing import prepare
@@ -81,6 +81,7 @@ class ScheduledFit(AbstractResult):
         alone: the fit of the records of each setting alone, whose laws the common fit started from.
         choice: whether parameters are interpolated between settings or forces blended, and why.
         chain: the fits behind it.
+        respond, score: of `result`: the forces of records with the machine, and how well they are predicted.
     """
 
     result: FitResult
@@ -92,8 +93,7 @@ class ScheduledFit(AbstractResult):
     def between(self) -> tuple[LeftOutSetting, ...]:
         """How well the law interpolates, for each setting between others; fitted when first asked for."""
         with Progress("Leaving out settings") as shown:
-            blend = self.choice.blend
-            return tuple(self.chain.without(setting, blend, shown) for setting in self.chain.settings[1:-1])
+            return tuple(self.chain.without(u, self.choice.blend, shown) for u in self.chain.settings[1:-1])
 
     @property
     def law(self) -> Scheduled:
@@ -101,21 +101,31 @@ class ScheduledFit(AbstractResult):
         assert isinstance(self.result.law, Scheduled)
         return self.result.law
 
+    respond = Derived(lambda self: self.result.respond)
+    score = Derived(lambda self: self.result.score)
     status = Derived(lambda self: self.result.status)
     warnings = Derived(lambda self: self.result.warnings)
 
     @property
     def summary(self) -> str:
         """The settings, and the errors of the common fit."""
-        settings = ", ".join(f"{setting:g}" for setting in self.alone)
-        percent, rmse = self.result.fit_percent, self.result.rmse
-        return f"One law for the settings {settings}: fit {percent:.1f} %, RMSE {rmse:.1f} N."
+        settings, result = ", ".join(f"{setting:g}" for setting in self.alone), self.result
+        return f"One law for the settings {settings}: fit {result.fit_percent:.1f} %, RMSE {result.rmse:.1f} N."
 
     @property
     def verdict(self) -> tuple[str, ...]:
         """Sentences on the common fit and on the interpolation."""
         none = "No setting lies between two others, so the interpolation cannot be scored: measure a third one."
-        return self.summary, self.choice.reason, *([left.sentence("The law") for left in self.between] or [none])
+        said = []
+        if varying := self.chain.varying:
+            percent, rmse, _ = self.result.score(varying)
+            said = [f"Where the command varies ({len(varying)} records): fit {percent:.1f} %, RMSE {rmse:.1f} N."]
+        return (
+            self.summary,
+            self.choice.reason,
+            *said,
+            *([left.sentence("The law") for left in self.between] or [none]),
+        )
 
     def table(self) -> Table:
         """For each setting, the fit of the law of this setting alone, of the common law, and of an interpolated one."""
@@ -170,9 +180,12 @@ def fit_scheduled(
     ways. With two, forces are blended if some number of a law is not determined by the records or if the law halfway
     leaves the span of its neighbours' forces, since such numbers differ from setting to setting without a meaning.
 
+    Records whose command varies (`BenchRun.command_channel`) join the common fit, with the way of the settings. There
+    the lag of the actuator can be estimated too: `rig=["offset", "command_lag"]`.
+
     Arguments:
         law: the start, as in `fit`, of a law without a command.
-        runs: records that state their `command`, of two or more commands.
+        runs: records that state their `command`, of two or more commands, and such with a command that varies.
         common: parameters that do not depend on the setting, by path, last part of a path or pattern.
         rig: the test machine as in `compare`, common to all settings.
         weighting: `"samples"` or `"runs"`, as in `fit`.
@@ -205,7 +218,11 @@ def fit_scheduled(
     if options.get("initial_state") == "estimated":
         remedy = 'Estimate states in fits of one setting: `fit(law, runs, initial_state="estimated")`.'
         _checks.refuse("initial_state", "be the same at every fit of a chain of settings", "'estimated'", remedy)
-    chain = Chain(law, runs, common, rig, options | {"weighting": weighting, "freeze": frozen, "bad_records": "keep"})
+    held_rig, lag = without_command_lag(rig)
+    refuse_lag_of_held(lag > 0.0, runs)
+    chain = Chain(
+        law, runs, common, held_rig, lag, options | {"weighting": weighting, "freeze": frozen, "bad_records": "keep"}
+    )
     with Progress("Fitting by setting") as line:
         shown = progress or line
         alone = chain.alone(chain.settings, shown)
@@ -215,12 +232,13 @@ def fit_scheduled(
 
 
 def settings_stated(runs: Sequence[BenchRun]) -> tuple[BenchRun, ...]:
-    """The records, all of which must state a command, of two or more commands."""
+    """The records, all of which must state a command or have a channel of it, those that hold it two or more."""
     remedy = 'Pass it when reading, `bench.read(..., command={"*_0.5A": 0.5})`.'
-    if lacking := [run.name for run in runs if run.command is None]:
+    if lacking := [run.name for run in runs if run.commands is None]:
         _checks.refuse("runs", "all state their command", f"without one: {', '.join(lacking)}", remedy)
-    if len(commands := {run.command for run in runs}) < 2:
-        _checks.refuse("runs", "have two commands or more", f"records of {commands}", "Use `fit` for one setting.")
+    if len(commands := {run.command for run in runs if run.command is not None}) < 2:
+        remedy = "Use `fit` for one setting, and with a start, `Scheduled(...)`, where the command varies in all."
+        _checks.refuse("runs", "have two commands or more that are held", f"records of {commands or 'none'}", remedy)
     return tuple(runs)
 
 
@@ -231,7 +249,8 @@ class Chain:
     law: Start
     runs: tuple[BenchRun, ...]
     common: Sequence[str]
-    rig: Machine
+    rig: Machine  # without the lag of the actuator, which shows only where the command varies
+    command_lag: float  # s, its start; 0 where none is fitted
     options: dict[str, Any]
     own: Alone = dataclasses.field(default_factory=dict)  # the fit at a setting from the start of the law there
 
@@ -240,9 +259,18 @@ class Chain:
         """The commands in increasing order."""
         return sorted({float(run.command) for run in self.runs if run.command is not None})
 
+    @property
+    def varying(self) -> list[BenchRun]:
+        """The records whose command varies."""
+        return [run for run in self.runs if run.command_channel is not None]
+
     def at(self, setting: float) -> list[BenchRun]:
         """The records of one setting."""
         return [run for run in self.runs if run.command == setting]
+
+    def held(self, settings: Iterable[float]) -> list[BenchRun]:
+        """The records of these settings."""
+        return [run for setting in settings for run in self.at(setting)]
 
     def alone(self, settings: Sequence[float], shown: Callable[[str], None]) -> Alone:
         """The best fit at each of these settings: from its own start, or from the neighbour below or above."""
@@ -282,21 +310,24 @@ class Chain:
         """The fit of all records of these settings as one law, from the laws of each.
 
         At the settings, where all records are, interpolated parameters and blended forces are one law. So laws of equal
-        structure are fitted with interpolated parameters, which takes the states and the time of one law.
+        structure are fitted with interpolated parameters, which takes the states and the time of one law. Records whose
+        command varies are between the settings; they are left out together with any setting.
         """
         laws = [at.law for at in alone.values()]
         alike = Scheduled.of_equal_structure(laws)
         shared = self._shared_by(laws)
         means = {path: np.mean([np.asarray(get(law, path)) for law in laws], axis=0) for path in shared}
-        machine = _mean_machine(alone)
+        varying = self.varying if list(alone) == self.settings else []
+        machine = _mean_machine(alone, self.command_lag if varying else 0.0)
         place = "laws" if machine is None else "law.laws"
         tie = {f"{place}.{k}.{path}": f"{place}.0.{path}" for path in shared for k in range(1, len(laws))}
         blended = tuple(with_values(law, means) for law in laws)
-        scheduled = Scheduled(blended, list(alone), min(alone), "parameters" if alike else "force")
-        held = [] if machine is None else _held_by_machine(scheduled)
+        at_levels = alike and not (varying and blend == "force")
+        scheduled = Scheduled(blended, list(alone), min(alone), "parameters" if at_levels else "force")
+        held = held_constant_forces(scheduled, machine)
         options: dict[str, Any] = self.options | {"starts": 1, "tie": tie, "freeze": [*self.options["freeze"], *held]}
-        result = fit(scheduled, [run for setting in alone for run in self.at(setting)], rig=machine, **options)
-        return with_blended_forces(result) if alike and blend == "force" else result
+        result = fit(scheduled, [*self.held(alone), *varying], rig=machine, **options)
+        return with_blended_forces(result) if at_levels and blend == "force" else result
 
     def _shared_by(self, laws: Sequence[AbstractDamper]) -> list[str]:
         """The paths of the parameters that are common to all settings."""
@@ -312,12 +343,8 @@ class Chain:
         return LeftOutSetting(setting, runs, result, *result.score(runs)[:2], there.fit_percent, there.rmse)
 
 
-def _mean_machine(alone: Alone) -> Rig | None:
-    """The mean of the machines that were fitted."""
+def _mean_machine(alone: Alone, command_lag: float) -> Rig | None:
+    """The mean of the machines that were fitted, with this start of the lag of the actuator [s]; 0 for none."""
     rigs = [at.rig for at in alone.values() if at.rig is not None]
-    return jax.tree.map(lambda *leaves: sum(leaves) / len(leaves), *rigs) if rigs else None
-
-
-def _held_by_machine(law: AbstractDamper) -> list[str]:
-    """The constant forces of a law that stay zero, since the machine has the static force."""
-    return [path for path in constant_forces(law) or [] if float(get(law, path)) == 0.0]
+    mean = jax.tree.map(lambda *leaves: sum(leaves) / len(leaves), *rigs) if rigs else None
+    return dataclasses.replace(mean or Rig(), command_lag=command_lag) if command_lag else mean

@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import command_paths, takes_command, with_command
+from jaxdamp.dampers import check_commands, command_paths, takes_command, with_command
 from jaxdamp.identify.initial_states import Cycle
 from jaxdamp.identify.model import (
     Model,
@@ -27,11 +27,23 @@ from jaxdamp.identify.model import (
     starts_in,
 )
 from jaxdamp.identify.problem import AbstractResiduals
-from jaxdamp.identify.rows import Row, averaged, cycles_of, on_device, resting_blocks, row_of, samples_in_block
+from jaxdamp.identify.rows import (
+    Row,
+    averaged,
+    channel,
+    cycles_of,
+    on_device,
+    refuse_units,
+    resting_blocks,
+    row_of,
+    samples_in_block,
+)
 from jaxdamp.parameters import get, with_values
+from jaxdamp.rig import Followed
 
 
 MOST_GROUPS = 2  # batches of a law with states: each is compiled on its own
+COMMAND_REMEDY = 'Pass it when reading, `bench.read(..., command={"*_0.5A": 0.5})`.'
 RECORDS_IN_GROUP = 200  # of many dampers, for which a further batch saves a quarter of the work
 
 
@@ -49,6 +61,7 @@ class Batch(AbstractResiduals):
     per_record: tuple[str, ...] = eqx.field(static=True)  # paths where the law has a value for each record
     substeps: int = eqx.field(static=True)
     temperature: Float[Array, "runs time"] | None = None  # where the model takes it from the records
+    command: Float[Array, "runs time"] | None = None  # where it varies in one of them
     cycle: Cycle | None = None  # before each record, where some start in the periodic solution
     effects: tuple[str, ...] = eqx.field(static=True, default=())  # of the machine (`Rig.effects`)
 
@@ -63,20 +76,25 @@ class Batch(AbstractResiduals):
             dt: Array,
             x: Array,
             v: Array,
-            temperature: Array | None,
+            followed: Followed,
             cycle: Cycle | None,
             state: Array | None,
             values: dict[str, Array],
         ) -> tuple[Array, Array]:
             own, change = with_values(model, values), jnp.zeros(())
             if cycle is not None:
-                state, change = initial_state(own, self.effects, cycle, temperature)
-            return marched(own, self.effects, dt, x, v, temperature, self.substeps, state), change
+                state, change = initial_state(own, self.effects, cycle, followed)
+            return marched(own, self.effects, dt, x, v, followed, self.substeps, state), change
 
         starts = [start.initial_state for start in starts_in(model) if start is not None]
         estimated = jnp.stack(starts)[self.number] if starts else None
-        motion = (self.dt, self.stroke, self.velocity, self.temperature, self.cycle, estimated)
+        motion = (self.dt, self.stroke, self.velocity, self.followed, self.cycle, estimated)
         return jax.vmap(one)(*motion, self.own_values(model))
+
+    @property
+    def followed(self) -> Followed:
+        """What the law follows beside the motion."""
+        return Followed(self.temperature, self.command)
 
     def own_values(self, model: Model) -> dict[str, Array]:
         """The values that differ from record to record, by path."""
@@ -162,18 +180,19 @@ def _batch(
     fixed: Mapping[str, Sequence[float]],
     per_record: tuple[str, ...],
     effects: tuple[str, ...],
+    channels: Sequence[str],
 ) -> Batch:
     length = _round_up(max(len(row.weight) for row in rows))
     signals = zip(*(row.signals for row in rows), strict=True)
     columns = [on_device(np.stack([_pad(values, length) for values in channel])) for channel in signals]
-    stroke, velocity, force, *temperature = columns
+    stroke, velocity, force, *beside = columns
     weight = np.stack([_pad(row.weight, length, "constant") for row in rows])
     number = np.array([row.number for row in rows])
     dt, substeps = np.array([row.dt for row in rows]), max(row.substeps for row in rows)
     own = {path: on_device(np.array(values, float)[number]) for path, values in fixed.items()}
     arrays = (on_device(dt), stroke, velocity, force, on_device(weight), on_device(number))
-    warm, cycle = temperature[0] if temperature else None, cycles_of(rows, runs)
-    return Batch(*arrays, own, per_record, substeps, warm, cycle, effects)
+    followed = dict(zip(channels[3:], beside, strict=True))
+    return Batch(*arrays, own, per_record, substeps, cycle=cycles_of(rows, runs), effects=effects, **followed)
 
 
 def _memoryless_batch(
@@ -188,28 +207,32 @@ def _memoryless_batch(
     ends = np.cumsum(counts)
     length = _round_up(int(ends[-1]))
     columns = [
-        _pad(np.concatenate([averaged(getattr(r, name), b) for r, b in zip(runs, blocks, strict=True)]), length)[None]
+        _pad(np.concatenate([averaged(channel(r, name), b) for r, b in zip(runs, blocks, strict=True)]), length)[None]
         for name in channels
     ]
     weight = np.repeat(np.sqrt(blocks) / np.asarray(sigma), counts)
     if not can_rest(model):
         weight[np.concatenate([resting_blocks(r, b) for r, b in zip(runs, blocks, strict=True)])] = 0.0
     arrays = (np.ones(1), *columns[:3], _pad(weight, length, "constant")[None], np.zeros(1, int))
-    temperature = on_device(columns[3]) if len(columns) > 3 else None
+    followed = dict(zip(channels[3:], map(on_device, columns[3:]), strict=True))
     ranges = [SampleRange(0, 0, int(end) - n, int(end), b) for end, n, b in zip(ends, counts, blocks, strict=True)]
-    return (Batch(*map(on_device, arrays), fixed={}, per_record=(), substeps=1, temperature=temperature),), ranges
+    return (Batch(*map(on_device, arrays), fixed={}, per_record=(), substeps=1, **followed),), ranges
 
 
 def _stated(model: Model, runs: Sequence[BenchRun]) -> dict[str, list[float]]:
-    """Values that the records state for the law, by path: the command, if the law has one."""
+    """Values that the records state for the law, by path: the command, if the law has one and it is held in all."""
     commands, law = [run.command for run in runs if run.command is not None], law_of(model)
-    if not takes_command(law) or not commands:
+    if not takes_command(law) or not commands or _vary(runs):
         return {}
-    remedy = 'Pass it when reading, `bench.read(..., command={"*_0.5A": 0.5})`.'
-    _refuse_some("command", runs, remedy)
+    _refuse_some("command", runs, COMMAND_REMEDY)
     for command in set(commands):
         with_command(law, command)  # refuses what is out of range
     return dict.fromkeys(command_paths(model), commands)
+
+
+def _vary(runs: Sequence[BenchRun]) -> bool:
+    """Whether the command varies in one of the records."""
+    return any(run.command_channel is not None for run in runs)
 
 
 def _refuse_some(what: str, runs: Sequence[BenchRun], remedy: str) -> None:
@@ -222,15 +245,22 @@ def _refuse_some(what: str, runs: Sequence[BenchRun], remedy: str) -> None:
 def _channels(model: Model, runs: Sequence[BenchRun]) -> list[str]:
     """The channels that a model is compared with, the temperature among them if it says something of the force."""
     channels, rig = ["stroke", "velocity", "force"], rig_of(model)
+    law = law_of(model)
+    varying = ["command"] if takes_command(law) and _vary(runs) else []
+    if varying:
+        _refuse_some("commands", runs, COMMAND_REMEDY)
+        refuse_units(runs)
+        for run in runs:
+            check_commands(f"command of {run.name!r}", law, channel(run, "command"))
     of_rig = rig is not None and (
         np.any(np.asarray(rig.temperature_slope)) or np.any(np.asarray(rig.gas_temperature_slope))
     )
-    if not (of_rig or law_of(model).traits().temperature_dependent):
-        return channels
+    if not (of_rig or law.traits().temperature_dependent):
+        return channels + varying
     if all(run.temperature is None for run in runs):
-        return channels
+        return channels + varying
     _refuse_some("temperature", runs, "Fit those with and those without it apart.")
-    return [*channels, "temperature"]
+    return [*channels, "temperature", *varying]
 
 
 def batches(
@@ -293,11 +323,12 @@ def _row_batches(
 ) -> tuple[list[Row], list[list[int]], tuple[Batch, ...]]:
     """A row for each record, the groups of rows, and the batch of each group."""
     start = "rest" if is_memoryless(model) else initial_state_for(model, initial_state)
-    how = (samples_per_cycle, model, can_rest(model), _channels(model, runs), start)
+    channels = _channels(model, runs)
+    how = (samples_per_cycle, model, can_rest(model), channels, start)
     rows = [row_of(run, s, *how, number) for number, (run, s) in enumerate(zip(runs, sigma, strict=True))]
-    groups, fixed = _grouped(rows), _stated(model, runs)
+    groups, fixed, effects = _grouped(rows), _stated(model, runs), effects_of(model)
     members = [([rows[i] for i in group], [runs[i] for i in group]) for group in groups]
-    return rows, groups, tuple(_batch(*of, fixed, per_record, effects_of(model)) for of in members)
+    return rows, groups, tuple(_batch(*of, fixed, per_record, effects, channels) for of in members)
 
 
 def places(made: Sequence[Batch], ranges: Sequence[SampleRange]) -> tuple[slice, ...]:

@@ -24,6 +24,7 @@ from jaxdamp.identify.noise import Noise, channel_noise
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd, Solver, search
 from jaxdamp.identify.several import Solution, search_scattered
+from jaxdamp.identify.vehicle_friction import friction_left_out
 from jaxdamp.identify.vehicle_left_out import on_free_scale, on_sensors, on_signs
 from jaxdamp.identify.vehicle_preparing import (
     FreeScale,
@@ -255,8 +256,12 @@ def _judged(
     scores = channel_scores(problem, end.residual, data.rides)
     signs = on_signs(scores, at_start)
     notes = [*on_status(end), *refused, *on_free_scale(scale, model), *signs, *estimates.notes]
-    if not signs:  # what a reversed channel looks like is no lag of a sensor
-        notes += on_sensors(problem, end, data.rides, data.channels, model.sensors)
+    if not signs:  # what a reversed channel looks like is no lag of a sensor, and what friction looks like neither
+        friction = friction_left_out(problem, end) if noise.inflation > 1.0 else None
+        notes += [friction.sentence] if friction else []
+        known = [end.jacobian, friction.columns] if friction else [end.jacobian]
+        beside = end._replace(jacobian=np.concatenate(known, axis=1))
+        notes += on_sensors(problem, beside, data.rides, data.channels, model.sensors)
     if noise.inflation > 1.0:
         notes.append(
             "Neighbouring residuals are alike: the vehicle or its sensors miss something systematic. The standard"

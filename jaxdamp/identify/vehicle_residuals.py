@@ -2,7 +2,7 @@
 
 import dataclasses
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, final
 
 import equinox as eqx
@@ -42,30 +42,51 @@ class RideBatch(AbstractResiduals):
     per_record: tuple[str, ...] = eqx.field(static=True)  # paths where the model has a value for each record
     by_forces: bool = eqx.field(static=True)  # the heights are forces on the wheels
 
-    def predict(self, model: VehicleTest) -> Float[Array, "records channels time"]:
-        """What the sensors show, in SI."""
+    def observed(self, model: VehicleTest) -> Float[Array, "records channels fine"]:
+        """The channels at the instants of the simulation, before the sensors, in SI."""
 
         def one(heights: Array, number: Array) -> Array:
-            of_record = with_values(model, {path: get(model, path)[number] for path in self.per_record})
+            of_record = self._of_record(model, number)
             system, dt = driven(of_record.vehicle, self.by_forces).system(), jnp.asarray(self.dt, heights.dtype)
             start = settled(system, heights[0])
             if of_record.starts:
                 motions = [jnp.concatenate([begin.position, begin.rate]) for begin in of_record.starts]
                 start = start + jnp.stack(motions)[number]
             saved, _ = recorded(self.engine, system, heights, dt, start)
-            rows = system.channels(self.channels)
-            values = jax.vmap(rows)(saved.motion, saved.port_force, saved.road, saved.road_rate).T
-            sensors = [of_record.sensors.get(name) for name in self.channels]
-            shown = [v if sensor is None else sensor(v, dt) for sensor, v in zip(sensors, values, strict=True)]
+            return jax.vmap(system.channels(self.channels))(
+                saved.motion, saved.port_force, saved.road, saved.road_rate
+            ).T
+
+        return self._each(one, self.heights)
+
+    def predict(self, model: VehicleTest) -> Float[Array, "records channels time"]:
+        """What the sensors show, in SI."""
+        return self._shown(model, self.observed(model))
+
+    def _shown(self, model: VehicleTest, observed: Array) -> Float[Array, "records channels time"]:
+        def one(channels: Array, number: Array) -> Array:
+            sensors, dt = self._of_record(model, number).sensors, jnp.asarray(self.dt, channels.dtype)
+            pairs = zip(self.channels, channels, strict=True)
+            shown = [sensors[name](values, dt) if name in sensors else values for name, values in pairs]
             return jnp.stack(shown)[:, :: self.finer]
 
-        if self.heights.shape[0] == 1:  # one loop over time is compiled to faster code than a batch of one
-            return one(self.heights[0], self.number[0])[None]
-        return jax.vmap(one)(self.heights, self.number)
+        return self._each(one, observed)
+
+    def _of_record(self, model: VehicleTest, number: Array) -> VehicleTest:
+        return with_values(model, {path: get(model, path)[number] for path in self.per_record})
+
+    def _each(self, one: Callable[[Array, Array], Array], arrays: Array) -> Array:
+        if arrays.shape[0] == 1:  # one loop over time is compiled to faster code than a batch of one
+            return one(arrays[0], self.number[0])[None]
+        return jax.vmap(one)(arrays, self.number)
+
+    def compared(self, model: VehicleTest, observed: Array) -> Float[Array, " samples"]:
+        """Weighted difference between what the sensors show of these channels and the measurement."""
+        return jnp.ravel((self._shown(model, observed) - self.measured) * self.weight)
 
     def __call__(self, model: VehicleTest) -> Float[Array, " samples"]:
         """Weighted difference between model and measurement."""
-        return jnp.ravel((self.predict(model) - self.measured) * self.weight)
+        return self.compared(model, self.observed(model))
 
     def reweighted(self, factor: Float[np.ndarray, " samples"]) -> "RideBatch":
         """The same with every weight times a factor."""

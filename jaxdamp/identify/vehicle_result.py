@@ -3,14 +3,14 @@
 import dataclasses
 import warnings
 from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp._results import Derived, drawn_by
-from jaxdamp._tables import Column, Table, with_unit
+from jaxdamp._tables import Column, Contents, Table, with_unit
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.estimates import parameter_table
 from jaxdamp.identify.model import VehicleTest
@@ -103,12 +103,12 @@ class VehicleFit(Fit):
             for row, number in enumerate(np.asarray(part.number)):
                 if self.records[number] is record:
                     return dict(
-                        zip(part.channels, np.asarray(_predict(part, self.problem.free.tree))[row], strict=True)
+                        zip(part.channels, np.asarray(predicted(part, self.problem.free.tree))[row], strict=True)
                     )
         rides = checked_records(self.vehicle, record)
         steps = [part.dt for part in self.problem.residuals if isinstance(part, RideBatch)]
         (part,) = ride_batches(rides, drives_of(self.vehicle, rides, max(steps)), dict.fromkeys(record.channels, 1.0))
-        shown = np.asarray(_predict(part, VehicleTest(self.vehicle, self.sensors)))[0]
+        shown = np.asarray(predicted(part, VehicleTest(self.vehicle, self.sensors)))[0]
         return dict(zip(part.channels, shown, strict=True))
 
     def score(self, records: RideRecord | Iterable[RideRecord]) -> tuple[ChannelScore, ...]:
@@ -120,15 +120,15 @@ class VehicleFit(Fit):
         rides = (records,) if isinstance(records, RideRecord) else tuple(records)
         scores, units = [], self.vehicle.units
         for ride in rides:
-            begin = int(np.ceil(self._settling / ride.dt))
+            begin = int(np.ceil(self.settling / ride.dt))
             for channel, values in self.respond(ride).items():
                 measured = ride[channel][begin:]
-                figures = _figures(measured, values[begin:] - measured)
-                scores.append(ChannelScore(ride.name, channel, units[channel], *figures))
+                errors = figures(measured, values[begin:] - measured)
+                scores.append(ChannelScore(ride.name, channel, units[channel], *errors))
         return tuple(scores)
 
     @property
-    def _settling(self) -> float:
+    def settling(self) -> float:
         """Time at the beginning of each record that was not compared [s]."""
         part = next(part for part in self.problem.residuals if isinstance(part, RideBatch))
         return int(np.argmax(np.asarray(part.weight)[0, 0] > 0)) * part.dt * part.finer
@@ -170,7 +170,7 @@ class VehicleFit(Fit):
         """Parameters, and the errors of the channels."""
         return {"parameters": self.table(), "scores": self.scores_table()}
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """The fit as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         return super().content() | {
             "vehicle": repr(self.vehicle),
@@ -194,7 +194,8 @@ class VehicleFit(Fit):
 
 
 @eqx.filter_jit
-def _predict(batch: RideBatch, model: VehicleTest) -> Array:
+def predicted(batch: RideBatch, model: VehicleTest) -> Array:
+    """What the sensors of a model show, in one program."""
     return batch.predict(model)
 
 
@@ -219,16 +220,16 @@ def channel_scores(
             for k, channel in enumerate(part.channels):
                 chosen = used[i, k]
                 error = errors[i, k][chosen] / weight[i, k][chosen]
-                figures = _figures(records[number][channel][chosen], error)
-                scores[number, k] = ChannelScore(records[number].name, channel, units[channel], *figures)
+                sizes = figures(records[number][channel][chosen], error)
+                scores[number, k] = ChannelScore(records[number].name, channel, units[channel], *sizes)
     on_bench = [
-        ChannelScore("bench", f"{path} force", "N", *_figures(*map(np.concatenate, zip(*pairs, strict=True))))
+        ChannelScore("bench", f"{path} force", "N", *figures(*map(np.concatenate, zip(*pairs, strict=True))))
         for path, pairs in forces.items()
     ]
     return (*[scores[key] for key in sorted(scores)], *on_bench)
 
 
-def _figures(measured: np.ndarray, error: np.ndarray) -> tuple[float, float, float, float]:
+def figures(measured: np.ndarray, error: np.ndarray) -> tuple[float, float, float, float]:
     """RMSE, fit percent, largest error, and correlation of predicted and measured values."""
     percent = fit_percent([measured], [measured + error])
     sizes = np.std(measured) * np.std(measured + error)

@@ -9,8 +9,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._results import drawn_by
 from jaxdamp._tables import Column, Contents, Table
-from jaxdamp._types import Figure, Scalar, ScalarLike, Signal, SignalLike
+from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
 from jaxdamp.metrics._signals import as_signal
 
 
@@ -119,11 +120,7 @@ class RoughnessBySegment(NamedTuple):
     def __str__(self) -> str:
         return self.table().to_text()
 
-    def plot(self) -> Figure:
-        """The index over the distance (`plots.roughness_by_segment`)."""
-        from jaxdamp import plots
-
-        return plots.roughness_by_segment(self)
+    plot = drawn_by("roughness_by_segment", "The index over the distance.")
 
 
 def international_roughness_by_segment(

@@ -7,7 +7,11 @@ Fits, tables, plot labels and reports all read that one declaration. A *path* su
 parameter inside a composition. Freezing, ties and extra bounds are arguments of a fit or of a tuning, never of the law.
 """
 
-from jaxdamp.parameters._checking import check_parameters as check_parameters, checked as checked
+from jaxdamp.parameters._checking import (
+    AbstractDeclared as AbstractDeclared,
+    check_parameters as check_parameters,
+    checked as checked,
+)
 from jaxdamp.parameters._coordinates import Bounds as Bounds, Coordinates as Coordinates
 from jaxdamp.parameters._declaration import (
     Module as Module,

@@ -9,7 +9,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._field_types import check_field_types
 from jaxdamp._traced import behind
-from jaxdamp.parameters._declaration import domain_of, modules_inside
+from jaxdamp.parameters._declaration import Module, domain_of, modules_inside, readable
 
 
 Tree = TypeVar("Tree")
@@ -17,8 +17,6 @@ Tree = TypeVar("Tree")
 
 def check_parameters(module: eqx.Module) -> None:
     """Refuse fields of a wrong type and values outside their domain (inside `jax.jit` they are not known).
-
-    Modules call it in `__check_init__`.
 
     Arguments:
         module: the law, vehicle or other module.
@@ -37,6 +35,16 @@ def check_parameters(module: eqx.Module) -> None:
         if not all(map(domain.contains, each)):
             unit = f" [{declared['unit']}]" if declared["unit"] else ""
             _checks.refuse(argument, f"be {domain.name}{unit}", value, f"It is the {declared['meaning']}.")
+
+
+class AbstractDeclared(Module):
+    """A module with declared parameters, which are checked when it is made, and which prints as a line with them."""
+
+    def __check_init__(self) -> None:
+        check_parameters(self)
+
+    def __repr__(self) -> str:
+        return readable(self)
 
 
 def checked(tree: Tree) -> Tree:

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, PyTree
 
-from jaxdamp._traced import of_known_numbers
+from jaxdamp import _checks
 
 
 Numbers: TypeAlias = PyTree  # arrays of JAX or NumPy, as the arguments are
@@ -218,8 +218,6 @@ def _raw_of_ordered_shares(shares: Numbers) -> Numbers:
     return xp.log(gaps[:-1] / gaps[-1])
 
 
-@of_known_numbers
-@functools.cache
 def interval(lower: float, upper: float) -> Domain:
     """Numbers between two finite ones (scaled logistic map).
 
@@ -227,11 +225,15 @@ def interval(lower: float, upper: float) -> Domain:
         lower: lower end, in the unit of the parameter.
         upper: upper end.
     """
+    return _interval(_checks.plain_number("lower", lower), _checks.plain_number("upper", upper))
+
+
+@functools.cache
+def _interval(lower: float, upper: float) -> Domain:
+    """The same domain for the same ends: what holds it compiles once."""
     return _bounded("", lower, upper, jax.nn.sigmoid, _logit, interval)
 
 
-@of_known_numbers
-@functools.cache
 def ordered_interval(lower: float, upper: float) -> Domain:
     """Increasing numbers between two finite ones: their gaps are the shares of a softmax.
 
@@ -239,5 +241,10 @@ def ordered_interval(lower: float, upper: float) -> Domain:
         lower: lower end, in the unit of the parameter.
         upper: upper end.
     """
+    return _ordered_interval(_checks.plain_number("lower", lower), _checks.plain_number("upper", upper))
+
+
+@functools.cache
+def _ordered_interval(lower: float, upper: float) -> Domain:
     maps = _ordered_shares, _raw_of_ordered_shares, ordered_interval
     return _bounded("strictly increasing ", lower, upper, *maps, increasing.steps, _slopes_of_ordered_shares)

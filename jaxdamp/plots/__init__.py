@@ -1,9 +1,12 @@
 """Pictures of fits, laws, rides and tunings. Each function returns its matplotlib `Figure` and shows nothing.
 
 Save one with `figure.savefig("fit.png", dpi=150)`; in a notebook it is shown as the value of a cell. No function
-touches pyplot or its global state, and matplotlib is loaded by the first call only.
+touches pyplot or its global state, and matplotlib is loaded by the first call only. Figures of your own look alike with
+`matplotlib.pyplot.style.use(plots.STYLE)` and `**plots.ROLES["before"]`.
 """
 
+from jaxdamp.plots._style import ROLES, STYLE
+from jaxdamp.plots.animation import animation as animation
 from jaxdamp.plots.cards import law_card
 from jaxdamp.plots.changes import tuning
 from jaxdamp.plots.curves import force_velocity, force_velocity_family as force_velocity_family
@@ -42,6 +45,8 @@ from jaxdamp.plots.sweeps import sweep
 
 
 __all__ = [
+    "ROLES",
+    "STYLE",
     "damper_use",
     "evaluation",
     "force_velocity",

@@ -76,7 +76,7 @@ def road(axes: Axes, shown: _rides.Rides) -> None:
     axes.fill_between(n, low * line, high * line, color="0.55", alpha=0.3, linewidth=0.0)
     axes.set_ylim(0.2 * low * line[-1], 4.0 * high * line[0])
     axes.set_xlim(n[0], n[-1])
-    _style.frequency_axis(axes.xaxis)
+    _style.plain_log_axis(axes.xaxis)
     title = f"Road: ISO 8608 class {name}, {_style.short(speed)} m/s"
     _style.dress(axes, "spatial frequency [cycle/m]", "height PSD [m³]", title)
 
@@ -198,7 +198,8 @@ def damper(curves: Axes, shares: Axes, shown: _rides.Rides, path: str) -> None:
     curves.tick_params(labelbottom=False)
     curves.set_xlim(-reach, reach)
     if len(shown.styles()) > 1:
-        curves.legend(frameon=False, loc="upper left")
+        drawn = [line for line in curves.get_lines() if not str(line.get_label()).startswith("_")]
+        curves.legend(handles=drawn, frameon=False, loc="upper left")
 
 
 def _thousandths(*panels: Axes) -> None:
@@ -225,11 +226,9 @@ def spectrum(axes: Axes, shown: _rides.Rides) -> None:
     for word, group in (("body", frequencies[frequencies < 4.0]), ("wheels", frequencies[frequencies >= 4.0])):
         if group.size:
             middle = float(np.exp(np.mean(np.log(group))))
-            axes.text(
-                middle, 0.97, word, transform=axes.get_xaxis_transform(), ha="center", va="top", color=_style.GREY
-            )
-    axes.set_ylim(max(low, 1e-5 * high), high)
-    _style.frequency_axis(axes.xaxis)
+            axes.text(middle, 0.02, word, transform=axes.get_xaxis_transform(), ha="center", color=_style.GREY)
+    axes.set_ylim(max(0.3 * low, 1e-5 * high), high)  # with room for these words below the dips
+    _style.plain_log_axis(axes.xaxis)
     axes.set_xlim(0.5, 30.0)
     unit = typeset_unit(shown.cars[0].units[channel])
     title = f"Spectrum of the {_style.metric_words(channel)}{_rides.dips(shown)}"

@@ -1,5 +1,6 @@
 """What the sheets share: one A4 page with a sentence at the top, panels, tables of text, remarks."""
 
+import re
 import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -44,13 +45,14 @@ def head(axes: Axes, name: str, sentence: str, facts: str, *, answer: str = "", 
         colour: of the answer, or of the sentence without one: good or bad.
     """
     blank(axes)
-    axes.text(0.0, 1.0, f"{_style.typeset(name)}   ·   {_style.typeset(facts)}"[:130], color=_style.GREY, **_TEXT)
+    axes.text(0.0, 1.0, f"{_style.said(name)}   ·   {_style.said(facts)}"[:130], color=_style.GREY, **_TEXT)
     if answer:
         axes.text(0.0, 0.79, answer, fontsize=14.0, fontweight="bold", color=colour, **_TEXT)
         look, width, top = {"fontsize": 8.5}, 118, 0.46
     else:
         look, width, top = {"fontsize": 10.5, "fontweight": "bold", "color": colour}, 80, 0.76
-    lines = textwrap.wrap(_style.typeset(sentence), width)
+    together = re.sub(r"(?<=\d) (?=[^\W\d]|%|±)|(?<=±) ", "\N{NO-BREAK SPACE}", _style.said(sentence))
+    lines = textwrap.wrap(together, width)
     lines = [*lines[:2], f"{lines[2].rstrip(' ,;.')} …"] if len(lines) > 3 else lines
     axes.text(0.0, top, "\n".join(lines), **look, **_TEXT)
 
@@ -105,7 +107,7 @@ def remarks(axes: Axes, title: str, sentences: Sequence[str], *, width: int, non
         most: sentences to write.
     """
     blank(axes)
-    shown = [textwrap.shorten(_style.typeset(s), 3 * width, placeholder=" …") for s in sentences[:most]]
+    shown = [textwrap.shorten(_style.said(s), 3 * width, placeholder=" …") for s in sentences[:most]]
     lines = [line for s in shown or [none] for line in textwrap.wrap(s, width, subsequent_indent="   ")]
     lines += [f"and {len(sentences) - most} more on the page"] * (len(sentences) > most)
     axes.text(0.0, 1.0, title, **_TEXT)

@@ -3,6 +3,7 @@
 import re
 import textwrap
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -11,7 +12,16 @@ from jaxdamp import _checks
 from jaxdamp._display import display
 from jaxdamp._tables import typeset_unit
 from jaxdamp._types import Axes, Figure
-from jaxdamp.dampers import AbstractDamper, Sum
+from jaxdamp._words import (
+    class_words as class_words,
+    first_upper as first_upper,
+    in_words as in_words,
+    metric_words as metric_words,
+    path_words as path_words,
+    said as said,
+    typeset as typeset,
+)
+from jaxdamp.dampers import law_name as law_name
 
 
 if TYPE_CHECKING:
@@ -35,30 +45,39 @@ REFERENCE: Look = {"color": "#949494", "linestyle": "-", "linewidth": 3.5, "zord
 LIMIT: Look = {"color": BAD, "linestyle": "--", "linewidth": 1.2}
 REBOUND, COMPRESSION = COLOURS[0], COLOURS[1]  # where both are on one axis
 FRONT, REAR = "-", "-."
+ROLES: Mapping[str, Mapping[str, Any]] = MappingProxyType(
+    {
+        "measured": MEASURED,
+        "before": BEFORE,
+        "after": AFTER,
+        "reference": REFERENCE,
+        "limit": LIMIT,
+        "shade": {"color": SHADE, "linewidth": 0.0, "zorder": 0.0},
+    }
+)
+"""What a line of your own figure is drawn with: `axes.plot(x, y, **plots.ROLES["after"])`. "shade" is for what is
+extrapolated, or a range that is allowed."""
+STYLE: Mapping[str, Any] = MappingProxyType(
+    {
+        "figure.constrained_layout.use": True,
+        "axes.prop_cycle": f"cycler('color', {list(COLOURS)})",
+        "axes.grid": True,
+        "axes.axisbelow": True,
+        "grid.color": "0.9",
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.titlelocation": "left",
+        "axes.titlesize": "medium",
+        "legend.frameon": False,
+    }
+)
+"""The look of the library's pictures for figures of your own: `matplotlib.pyplot.style.use(plots.STYLE)`; "C0" to "C5"
+are then its colours."""
 
 VELOCITY = "velocity [m/s]   (+ rebound, − compression)"
 STROKE = "stroke [mm]   (+ rebound, − compression)"
 FORCE = "force [N]   (+ resists extension)"
 SIMULATE = "Take what `jaxdamp.simulate(vehicle, road)` gives, or several by name: {'before': ..., 'after': ...}."
-
-_PEOPLE = {
-    "besinger": "Besinger", "bouc wen": "Bouc–Wen", "dahl": "Dahl", "lu gre": "LuGre", "lugre": "LuGre",
-    "karadayi masada": "Karadayi–Masada", "stribeck": "Stribeck", "coulomb": "Coulomb",
-}  # fmt: skip
-_BESIDE = ("series spring", "lag", "series spring dahl")  # at the end of the name of a law: what stands beside the law
-_METRICS = (  # patterns in the names of ride metrics, and how people say them
-    (r"^weighted_rms_(.*)", r"\1, weighted RMS"),
-    (r"^vibration_dose_value_(.*)", r"\1, vibration dose value"),
-    (r"^(rms|peak)_(.*)", r"\2, \1"),
-    (r"(.*)_(peak_to_peak|rms|mean)$", r"\1, \2"),
-    (r"\bsprung_|_sprung_", "body_"),
-    (r"working_space", "suspension travel"),
-    (r"dynamic_tyre_load", "tyre load variation"),
-    (r"_", " "),
-    (r"\brms\b", "RMS"),
-    (r"peak to peak", "peak–peak"),
-)
-_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -111,7 +130,7 @@ def short(value: float) -> str:
         return "–" if np.isnan(value) else f"{'−' * (value < 0)}∞"
     if value and not 1e-3 <= abs(value) < 1e5:
         digits, power = f"{value:.2e}".split("e")
-        text = f"{float(digits):g}·10{str(int(power)).translate(_RAISED)}"
+        text = typeset(f"{float(digits):g}·10^{int(power)}")
     else:
         text = f"{value:.0f}" if abs(value) >= 1e3 else f"{value:.3g}"
     return "0" if value == 0.0 else text.replace("-", "−")
@@ -133,41 +152,7 @@ def percent(value: float, digits: int = 0) -> str:
     return f"{text if float(text) else text[1:]} %".replace("-", "−")
 
 
-def typeset(text: str) -> str:
-    """A sentence as it is printed: true minus, arrow, raised powers; names of metrics and laws in words."""
-    text = re.sub(r"\b\w+(?:_\w+)+\b", lambda match: metric_words(match[0]), text)
-    text = text.replace("->", "→").replace("^2", "²").replace("**", "·").replace("`", "")
-    return re.sub(r"(?<![\w])-(?=\d)", "−", text)
-
-
-def in_words(name: str) -> str:
-    """The name of a law, parameter or setting as people say it.
-
-    >>> in_words("besinger_lag"), in_words("front.damper.rebound_rate")
-    ('Besinger + lag', 'front damper rebound rate')
-    """
-    text = name.replace(".", " ").replace("_", " ").strip()
-    for part in _BESIDE:
-        lead = text.removesuffix(f" {part}")
-        text = f"{lead} + {part.replace(' dahl', ' + dahl')}" if lead != text and lead in _PEOPLE else text
-    for plain, said in _PEOPLE.items():
-        text = re.sub(rf"\b{plain}\b", said, text)
-    return text
-
-
-def metric_words(name: str) -> str:
-    """The name of a ride metric as people say it; of anything else, its words.
-
-    >>> metric_words("weighted_rms_sprung_acceleration"), metric_words("front_working_space_peak_to_peak")
-    ('body acceleration, weighted RMS', 'front suspension travel, peak–peak')
-    """
-    said = name
-    for pattern, words in _METRICS:
-        said = re.sub(pattern, words, said)
-    return in_words(said)
-
-
-def frequency_axis(axis: "matplotlib.axis.Axis") -> None:
+def plain_log_axis(axis: "matplotlib.axis.Axis") -> None:
     """A logarithmic axis with ticks at 1, 2 and 5 of each decade, in plain numbers."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
@@ -176,26 +161,29 @@ def frequency_axis(axis: "matplotlib.axis.Axis") -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def label_ends(axes: Axes, lines: Sequence["matplotlib.lines.Line2D"], gap: float = 0.05) -> None:
+def label_ends(
+    axes: Axes, lines: Sequence["matplotlib.lines.Line2D"], gap: float = 0.05, *, outside: bool = False
+) -> None:
     """The label of each line at its right end, in its colour, moved apart where labels would meet: no legend.
 
     Arguments:
         axes: with its limits set.
         lines: whose labels to write.
         gap: smallest distance of two labels, as a share of the height of the axes.
+        outside: beside the axes, also where a line ends before.
     """
     ends = []
     for line in lines:
-        x, y = (np.asarray(values, dtype=float) for values in line.get_data())
-        if np.isfinite(y).any():
-            last = np.flatnonzero(np.isfinite(y))[np.argmax(x[np.isfinite(y)])]
-            share = axes.transAxes.inverted().transform(axes.transData.transform((x[last], y[last])))
-            ends.append((*share, line))
+        points = np.column_stack([np.asarray(values, dtype=float) for values in line.get_data()])
+        points = points[np.isfinite(points).all(axis=1)]
+        if len(points):
+            shares = axes.transAxes.inverted().transform(axes.transData.transform(points))
+            ends.append((*shares[np.argmax(shares[:, 0])], line))
     place = -np.inf
     for x, y, line in sorted(ends, key=lambda end: end[1]):
         place = max(min(y, 1.0), place + gap)
         look = {"color": line.get_color(), "fontsize": "small", "va": "center", "annotation_clip": False}
-        to = (min(x, 1.0) + 0.015, place)
+        to = (1.0 if outside else min(x, 1.0)) + 0.015, place
         axes.annotate(str(line.get_label()), to, xycoords="axes fraction", **look)
 
 
@@ -304,21 +292,3 @@ def note_below(figure: Figure, sentences: Sequence[str]) -> None:
     ]
     if lines:
         figure.supxlabel("\n".join(lines), x=0.01, ha="left", fontsize="small", color="0.35")
-
-
-def law_name(law: AbstractDamper) -> str:
-    """The classes of a law in words: "Besinger + series spring", "linear + Coulomb friction"."""
-    if isinstance(law, Sum):
-        return " + ".join(law_name(term) for term in law.terms)
-    words, inside = class_words(law), law.inner_laws()
-    return f"{law_name(inside[0])} + {words}" if len(inside) == 1 else words
-
-
-def first_upper(words: str) -> str:
-    """Words that begin a sentence; units and names inside stay as they are."""
-    return words[:1].upper() + words[1:]
-
-
-def class_words(part: Any) -> str:
-    """The name of a class in words: "digressive progressive" of a DigressiveProgressive, "half car" of a HalfCar."""
-    return in_words(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(part).__name__).lower())

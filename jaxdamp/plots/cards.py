@@ -90,7 +90,9 @@ def law_card(
     names = free_parameters(law).names
     for number, i in enumerate(drawn):
         curve = loops.effects[fastest][:, i]
-        effects.plot(loops.velocity[fastest], curve, label=names[i], linewidth=1.4, **_style.line_style(number))
+        effects.plot(
+            loops.velocity[fastest], curve, label=_style.in_words(names[i]), linewidth=1.4, **_style.line_style(number)
+        )
     left_out = int(np.count_nonzero(sizes)) - len(drawn)
     more = f", {left_out} more" if left_out else ""
     _style.dress(over_velocity, "velocity [m/s]   (+ rebound)", "force [N]   (+ resists extension)")

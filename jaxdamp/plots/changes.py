@@ -1,4 +1,4 @@
-"""A tuning: laws and spectra before and after, the change of every ride metric, and the course of the search."""
+"""A tuning: laws and spectra before and after, and the change of every ride metric."""
 
 import textwrap
 from typing import Any
@@ -18,7 +18,7 @@ from jaxdamp.vehicles import AbstractVehicle
 
 
 def tuning(result: TuneResult, velocities: VectorLike | None = None) -> Figure:
-    """Force over velocity and response spectra before and after, the change of each ride metric, and the search.
+    """Force over velocity of each damper and response spectra before and after, and the change of each ride metric.
 
     Arguments:
         result: a tuning.
@@ -36,46 +36,44 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> Figure:
     height = max(6.0, 0.38 * len(result.before))  # a line of text for each metric
     figure = _style.new_figure(12.0, height + 3.0 * bool(spectra))
     rows = figure.add_gridspec(1 + bool(spectra), 1, height_ratios=(height, 3.0)[: 1 + bool(spectra)])
-    grid = rows[0].subgridspec(2, 2, width_ratios=(1.0, 1.0), height_ratios=(1.8, 1.0))
-    curves, bars, search = (figure.add_subplot(at) for at in (grid[:, 0], grid[0, 1], grid[1, 1]))
+    grid = rows[0].subgridspec(1, 2, width_ratios=(1.0, 1.0))
+    bars = figure.add_subplot(grid[1])
     if spectra:
         below = rows[1].subgridspec(1, len(spectra))
         for place, (channel, pair) in enumerate(spectra.items()):
             _spectrum(figure.add_subplot(below[place]), channel, result.start.units[channel], pair)
-    gaps = _laws(curves, pairs, np.asarray(velocities, dtype=float))
+    points, beside, gaps = np.asarray(velocities, dtype=float), grid[0].subgridspec(len(pairs), 1), []
+    for place, (name, pair) in enumerate(pairs.items()):
+        gaps += _law(figure.add_subplot(beside[place]), name, pair, points)
     verdict = result.verdict
     colour = _style.GOOD if verdict.better else _style.BAD
-    lines = [verdict.outcome.value, *textwrap.wrap(_style.typeset(verdict.sentence), 130)]
+    lines = [verdict.outcome.value, *textwrap.wrap(_style.said(verdict.sentence), 130)]
     figure.suptitle("\n".join(lines), fontsize="medium", color=colour)
     _bars(bars, result)
-    _search(search, result)
     _style.note_below(figure, gaps)
     return figure
 
 
-def _laws(curves: Axes, pairs: dict[str, tuple[AbstractDamper, AbstractDamper]], points: np.ndarray) -> list[str]:
-    """The laws before and after over the velocity; a sentence for each that has no settled force somewhere."""
+def _law(curves: Axes, name: str, pair: tuple[AbstractDamper, AbstractDamper], points: np.ndarray) -> list[str]:
+    """A law before and after over the velocity; a sentence for each that has no settled force somewhere."""
     gaps = []
-    for number, (name, pair) in enumerate(pairs.items()):
-        colour = _style.COLOURS[number % len(_style.COLOURS)]
-        settled = [quasi_static(law, points) for law in pair]
-        old, new = (np.asarray(curve.force) for curve in settled)
-        gaps += [f"{name}{when}: {c.note}" for when, c in zip(("before", "after"), settled, strict=True) if c.note]
-        earlier = colour if len(pairs) > 1 else _style.BLACK
-        fitted_range.curve(curves, pair[0], points, old, linestyle="--", color=earlier, label=f"{name}before")
-        fitted_range.curve(curves, pair[1], points, new, color=colour, linewidth=1.8, label=f"{name}after")
-    fitted_range.shade(curves, [law for pair in pairs.values() for law in pair], points)
-    _style.dress(curves, _style.VELOCITY, _style.FORCE, "Damper law")
+    for law, when, style in zip(pair, ("before", "after"), (_style.BEFORE, _style.AFTER), strict=True):
+        settled = quasi_static(law, points)
+        gaps += [f"{name} {when}: {settled.note}"] if settled.note else []
+        fitted_range.curve(curves, law, points, np.asarray(settled.force), label=when, **style)
+    fitted_range.shade(curves, pair, points)
+    _style.dress(curves, _style.VELOCITY, _style.FORCE, name)
     _style.cross(curves)
-    curves.legend(loc="best", frameon=False)
+    curves.legend(loc="upper left", frameon=False)
     return gaps
 
 
 def _changed(result: TuneResult) -> dict[str, tuple[AbstractDamper, AbstractDamper]]:
-    """The laws of both vehicles by a name to put before "before" and "after": those that differ, or the first."""
+    """The laws of both vehicles by the names of the dampers: those that differ, or the first."""
+    names = [_style.first_upper(_style.in_words(name)) for name in result.start.frame().element_names]
     pairs = list(zip(*(own_laws(vehicle) for vehicle in (result.start, result.vehicle)), strict=True))
     differing = [i for i, (old, new) in enumerate(pairs) if not eqx.tree_equal(old, new)] or [0]
-    return {f"damper {i + 1} " if len(differing) > 1 else "": pairs[i] for i in differing}
+    return {names[i]: pairs[i] for i in differing}
 
 
 def own_laws(vehicle: AbstractVehicle) -> list[AbstractDamper]:
@@ -121,18 +119,8 @@ def _spectrum(axes: Axes, channel: str, unit: str, pair: tuple[Any, Any]) -> Non
     for spectrum, style, label in zip(pair, (_style.BEFORE, _style.AFTER), ("before", "after"), strict=True):
         axes.loglog(spectrum.frequency, spectrum.density, label=label, **style)
     title = f"Spectrum of the {_style.metric_words(channel)}"
-    _style.dress(axes, "frequency [Hz]", f"[({typeset_unit(unit)})²/Hz]", title)
-    _style.frequency_axis(axes.xaxis)
+    squared = f"({typeset_unit(unit)})²" if "/" in unit else f"{unit}²"
+    _style.dress(axes, "frequency [Hz]", f"[{squared}/Hz]", title)
+    _style.plain_log_axis(axes.xaxis)
     axes.set_xlim(pair[0].frequency[0], pair[0].frequency[-1])
     axes.legend(frameon=False)
-
-
-def _search(axes: Axes, result: TuneResult) -> None:
-    from matplotlib.ticker import MaxNLocator
-
-    history = np.array([result.before[result.metric], *result.history])
-    axes.plot(np.arange(len(history)), history, "o-", color=_style.COLOURS[0], markersize=3.5, linewidth=1.3)
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    unit = typeset_unit(result.units[result.metric], "–")
-    title = f"Search: {_style.metric_words(result.metric)}"
-    _style.dress(axes, "step of the search", f"metric [{unit}]", title)

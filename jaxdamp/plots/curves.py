@@ -18,6 +18,9 @@ from jaxdamp.plots import _style, fitted_range
 from jaxdamp.rig import quasi_static
 
 
+_MOST_LABELS = 10  # at the ends of curves
+
+
 @of_known_numbers
 def force_velocity(
     laws: AbstractDamper | Mapping[str, AbstractDamper],
@@ -66,21 +69,32 @@ def force_velocity(
     points = np.asarray(velocities, dtype=float)
     figure = _style.new_figure(9.5, 5.5)
     axes = figure.subplots()
-    handles = _measured(axes, runs)
+    measured = _measured(axes, runs)
     bands = {alone: bands} if isinstance(bands, Band) else bands or {}
     for name in bands:
         _checks.one_of("bands", name, laws)
     curves, gaps = draw_laws(axes, laws, points, baseline, bands)
-    handles += curves
-    handles += fitted_range.shade(axes, laws.values(), points)
+    shaded = fitted_range.shade(axes, laws.values(), points)
     _style.dress(axes, _style.VELOCITY, _style.FORCE, title or _title(alone, runs))
     _style.cross(axes)
     axes.set_xlim(float(points.min()), float(points.max()))
-    _style.legend_beside(figure, handles)
+    _name(axes, measured, curves, shaded)
     without = f"The measured points are drawn without the static force of {static_force:.0f} N: gas or zero error."
     remarks = [note, without if runs and static_force else "", *gaps]
     _style.note_below(figure, [remark for remark in remarks if remark])
     return figure
+
+
+def _name(axes: Axes, measured: list, curves: list, shaded: list) -> None:
+    """Several curves have their names at their ends, one or many in the legend, as all else that is drawn."""
+    from matplotlib.lines import Line2D
+
+    lines = [curve for curve in curves if isinstance(curve, Line2D)]
+    if direct := 1 < len(lines) <= _MOST_LABELS:
+        _style.label_ends(axes, lines, outside=True)
+    handles = [*measured, *(curve for curve in curves if not (direct and curve in lines)), *shaded]
+    if handles:
+        axes.legend(handles=handles, loc="upper left", frameon=False, fontsize="small")
 
 
 def _title(law: str, runs: Sequence[BenchRun]) -> str:

@@ -3,7 +3,6 @@
 import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from jaxdamp.bench import BenchRun, Evaluation, LimitCheck, evaluate, last_stead
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Band, Comparison, FitResult, Rung
 from jaxdamp.plots import _sheet, _style, fitted_range
+from jaxdamp.plots.evaluation import both_directions, gas_and_friction_words
 from jaxdamp.plots.loops import spread
 from jaxdamp.rig import quasi_static
 
@@ -22,6 +22,7 @@ from jaxdamp.rig import quasi_static
 VELOCITIES = (25, 50, 100, 200, 300, 500, 700, 1000, 1500, 2000)  # mm/s, of the table of forces
 _MOST_SETTINGS, _MOST_LOOPS, _MOST_ROWS = 4, 6, 11
 _MM = 1e3
+_SEEN = 0.005  # share of the largest force from which a static force is worth a word
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,20 +33,21 @@ class _Damper:
     rung: Rung | None
     fit: FitResult | None
     laws: Mapping[str, AbstractDamper]
-    static_force: float  # N, of gas and load cell: in the records and not in the curves
+    static: Mapping[str, float]  # N, of gas and load cell by setting: in the records and not in the curves
     name: str
 
     @classmethod
     def of(cls, result: Comparison | FitResult | Evaluation, evaluation: Evaluation | None) -> "_Damper":
         if isinstance(result, Evaluation):
-            gas = [each.gas_force for each in result.gas_and_friction.values()]
-            return cls(result, None, None, {}, float(np.mean(gas)) if gas else 0.0, "Damper records")
+            known = result.gas_and_friction
+            gas = {name: known[name].gas_force if name in known else 0.0 for name in result.settings}
+            return cls(result, None, None, {}, gas, "Damper records")
         rung, fit = (result.best, result.best.result) if isinstance(result, Comparison) else (None, result)
         measured = evaluate(fit.runs) if evaluation is None else evaluation
         name = _style.law_name(fit.law) if rung is None else _style.in_words(rung.name)
         laws = {_style.in_words(name): law for name, law in rung.laws().items()} if rung else {name: fit.law}
         static = 0.0 if fit.rig is None else float(fit.rig.force_offset) + float(fit.rig.gas_force)
-        return cls(measured, rung, fit, laws, static, name)
+        return cls(measured, rung, fit, laws, dict.fromkeys(measured.settings, static), name)
 
     @property
     def runs(self) -> tuple[BenchRun, ...]:
@@ -66,7 +68,16 @@ class _Damper:
 
     @property
     def largest(self) -> float:
-        return max(float(np.abs(run.force - self.static_force).max()) for run in self.runs)
+        return max(float(np.abs(run.force - self.static_of(run)).max()) for run in self.runs)
+
+    @property
+    def static_force(self) -> float:
+        """The mean of those of the settings [N]."""
+        return float(np.mean(list(self.static.values())))
+
+    def static_of(self, run: BenchRun) -> float:
+        """The static force [N] of the setting of a record."""
+        return next(self.static[name] for name, runs in self.evaluation.settings.items() if run in runs)
 
 
 @of_known_numbers
@@ -175,11 +186,11 @@ def _records(axes: Axes, damper: _Damper) -> list:
         for run in spread(runs, _MOST_LOOPS):
             part = last_steady_cycle(run)
             loop = {"color": colour, "linewidth": 0.7, "alpha": 0.55, "zorder": 1.2}
-            axes.plot(_MM * run.velocity[part], run.force[part] - damper.static_force, **loop)
+            axes.plot(_MM * run.velocity[part], run.force[part] - damper.static[setting], **loop)
         peaks = peak_velocity_points(runs)
         velocity, force = (np.asarray(a).ravel() for a in (peaks.velocity, peaks.force))
         order = np.argsort(velocity)
-        points = _MM * velocity[order], force[order] - damper.static_force
+        points = _MM * velocity[order], force[order] - damper.static[setting]
         several = len(damper.evaluation.settings) > 1 and damper.fit is None
         look = {"color": colour, "linestyle": "-" if several else "", "linewidth": 1.4}
         look |= {"marker": "o", "markersize": 4.5, "markerfacecolor": "white", "zorder": 3.0}
@@ -189,7 +200,10 @@ def _records(axes: Axes, damper: _Damper) -> list:
 
 def _force_title(damper: _Damper) -> str:
     """What the picture shows and what was taken off."""
-    off = f", without the static force of {_style.short(damper.static_force)} N" if damper.static_force else ""
+    least, most = (_style.short(end(damper.static.values())) for end in (min, max))
+    span = least if least == most else f"{least} to {most}"
+    seen = max(map(abs, damper.static.values())) > _SEEN * damper.largest
+    off = f", without the static force of {span} N" if seen else ""
     return f"Force over velocity{off}"
 
 
@@ -237,7 +251,7 @@ def _measured_forces(damper: _Damper) -> tuple[np.ndarray, dict[str, np.ndarray]
     speeds = np.array(evaluation.velocities, dtype=float)
     forces = {
         (side, setting): np.array([evaluation.get(f"{side} force", setting=setting, velocity=v).value for v in speeds])
-        - damper.static_force
+        - damper.static[setting]
         for side in ("rebound", "compression")
         for setting in settings
     }
@@ -254,12 +268,12 @@ def _loops(axes: Axes, damper: _Damper) -> None:
     for number, run in enumerate(shown):
         cycle, colour = np.arange(len(run))[last_steady_cycle(run)], _style.graded(number, len(shown))
         part = np.append(cycle, cycle[0])  # closed
-        stroke = _MM * run.stroke[part]
-        force = run.force[part] - damper.static_force
+        stroke, static = _MM * run.stroke[part], damper.static_of(run)
+        force = run.force[part] - static
         broad: _style.Look = {"linewidth": 3.0, "alpha": 0.35} if fitted else {"linewidth": 1.2}
         axes.plot(stroke, force, color=colour, **broad)
         if run.name in fitted:
-            expected = fitted[run.name][part] - damper.static_force
+            expected = fitted[run.name][part] - static
             axes.plot(stroke, expected, color=colour, linewidth=1.0)
     fastest, slowest = (_style.short(_MM * shown[i].peak_velocity) for i in (-1, 0))
     speeds = f"{slowest} (dark) to {fastest} mm/s" if len(shown) > 1 else f"{fastest} mm/s"
@@ -288,7 +302,7 @@ def _errors(axes: Axes, damper: _Damper) -> None:
         if at:
             axes.semilogx(*np.array(at).T, mark, color=colour, markersize=5, label=label)
     _style.dress(axes, "frequency [Hz]", "% of the largest force", f"{title},\nby record")
-    _style.frequency_axis(axes.xaxis)
+    _style.plain_log_axis(axes.xaxis)
     axes.set_ylim(0.0, 1.3 * axes.get_ylim()[1])
     if "not fitted" in sizes:
         axes.legend(frameon=False)
@@ -301,25 +315,8 @@ def _gas_and_friction(axes: Axes, damper: _Damper) -> None:
         note = "Run a slow triangle or sine, below 20 mm/s, to tell gas force from friction."
         _sheet.remarks(axes, "Gas force and friction: not measured", [note], width=36)
         return
-    stroke, inner = _MM * separated.stroke, slice(len(separated.stroke) // 20, -max(len(separated.stroke) // 20, 1))
-    for force, colour, label in (
-        (separated.rebound, _style.REBOUND, "into rebound"),
-        (separated.compression, _style.COMPRESSION, "into compression"),
-    ):
-        axes.plot(stroke[inner], force[inner], color=colour, linewidth=1.4, label=label)
-    axes.plot(stroke[inner], separated.static_force(separated.stroke)[inner], ":", color=_style.BLACK, label="static")
-    values = {m.quantity: m for m in separated.measurements}
-    gas, friction = (" ± ".join(_pair(values[name])) for name in ("gas force", "friction"))
-    rate = _style.short(separated.gas_rate / _MM)
-    _style.dress(axes, "stroke [mm]", "force [N]", f"Static {gas} N, {rate} N/mm,\nfriction {friction} N")
-    axes.legend(frameon=False, loc="center")
-
-
-def _pair(measurement: Any) -> tuple[str, ...]:
-    """A measured value, and half its interval where it is known."""
-    if not measurement.uncertainty:
-        return (_style.short(measurement.value),)
-    return tuple(text.replace("-", "−") for text in rounded(measurement.value, measurement.uncertainty))
+    both_directions(axes, separated)
+    _style.dress(axes, "stroke [mm]", "force [N]", gas_and_friction_words(separated, ",\n"))
 
 
 def _parameters(axes: Axes, damper: _Damper) -> None:
@@ -327,16 +324,19 @@ def _parameters(axes: Axes, damper: _Damper) -> None:
     if damper.fit is not None:
         rows, colours = [], []
         for e in damper.fit.parameters:
-            value, error = rounded(e.value, 1.96 * e.standard_error)
-            name = _style.in_words(e.name.removeprefix("law.").replace("law.", "").replace("rig.", "machine: "))
+            factor, unit = (1e3, "ms") if e.unit == "s" else (1.0, typeset_unit(e.unit, "–"))
+            value, error = rounded(factor * e.value, factor * 1.96 * e.standard_error)
+            name = _style.path_words(e.name)
             doubtful = bool(e.note)
-            text = f"{_style.short(e.value)}  ({e.note})" if doubtful else f"{value} ± {error}".replace("-", "−")
-            rows.append([name, text, typeset_unit(e.unit, "–")])
+            text = (
+                f"{_style.short(factor * e.value)}  ({e.note})" if doubtful else f"{value} ± {error}".replace("-", "−")
+            )
+            rows.append([name, text, unit])
             colours.append(_style.BAD if doubtful else _style.BLACK)
         title, headings = "Parameters, ± 95 %", ["", "value", "unit"]
     else:
         texts = damper.evaluation.settings_table().texts()
-        rows = [[name, value.replace("-", "−"), unit] for name, unit, value, *_ in texts]
+        rows = [[name, value.replace("-", "−"), unit] for name, unit, value, *_ in texts if value]
         setting = next(iter(damper.evaluation.settings))
         title, headings = "Rates, knees, gas force" + f", setting {setting}" * bool(setting), ["", "value", "unit"]
         colours = [_style.BLACK] * len(rows)

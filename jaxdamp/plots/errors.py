@@ -1,14 +1,21 @@
 """The errors of several laws, on the records fitted and on others."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from jaxdamp._types import Figure
-from jaxdamp.identify import Comparison, CrossValidation
+from jaxdamp._types import Axes, Figure
+from jaxdamp.bench import white_noise
+from jaxdamp.identify import Comparison, CrossValidation, VehicleComparison
 from jaxdamp.plots import _style
 
 
-def ladder(comparison: Comparison) -> Figure:
-    """Bars of the RMSE of each law, on the fitted records and on motion that was held out.
+if TYPE_CHECKING:
+    from matplotlib.lines import Line2D
+
+
+def ladder(comparison: Comparison | VehicleComparison) -> Figure:
+    """Bars of the error of each law or vehicle, on the fitted records and on motion that was held out.
 
     Arguments:
         comparison: of `identify.compare`.
@@ -35,14 +42,15 @@ def ladder(comparison: Comparison) -> Figure:
         bars = axes.barh(rows + shift, values, thickness, color=colour, label=label)
         axes.bar_label(bars, fmt=_style.short, padding=3, fontsize="small")
         handles.append(bars)
-    largest, best = max(float(np.abs(run.force).max()) for run in comparison.best.result.runs), comparison.best
-    share = f"{_style.short(best.error)} N = {_style.short(100.0 * best.error / largest)} % of the largest force"
-    title = f"{_style.in_words(best.name)}: {share}"
-    _style.dress(axes, "RMS of the force error [N]   (free parameters in brackets)", "", title)
-    factor = 100.0 / largest
-    to_percent, back = (lambda x: np.multiply(x, factor)), (lambda x: np.divide(x, factor))
-    shares = axes.secondary_xaxis("top", functions=(to_percent, back))
-    shares.set_xlabel("% of the largest force")
+    if isinstance(comparison, VehicleComparison):
+        title = f"{_style.in_words(comparison.best.name)}: held-out fit {comparison.best.held_out_fit_percent:.1f} %"
+        label = "RMS error, as a multiple of the smallest in the fitted drives   (free parameters in brackets)"
+        _style.dress(axes, label, "", title)
+    else:
+        handles.append(_dress_in_newtons(axes, comparison))
+        alike = [_style.in_words(rung.name) for rung in comparison.recommendation.alike]
+        words = f"{' and '.join(alike)} predict alike within the scatter; the simplest is recommended."
+        _style.note_below(figure, [words] * (len(alike) > 1))
     axes.grid(False, axis="y")
     axes.set_yticks(rows, [f"{_style.in_words(r.name)} ({r.parameters})" for r in rungs])
     axes.get_yticklabels()[[r.name for r in rungs].index(comparison.best.name)].set_fontweight("bold")
@@ -50,6 +58,22 @@ def ladder(comparison: Comparison) -> Figure:
     axes.margins(x=0.1)
     _style.legend_beside(figure, handles)
     return figure
+
+
+def _dress_in_newtons(axes: Axes, comparison: Comparison) -> "Line2D":
+    """Title and axes of errors in newtons, and in percent of the largest force; the line of the sensor's noise."""
+    runs, best = comparison.best.result.runs, comparison.best
+    largest = max(float(np.abs(run.force).max()) for run in runs)
+    noise = float(np.sqrt(np.mean([white_noise(run.force) ** 2 for run in runs])))
+    share = f"{_style.short(best.error)} N = {_style.short(100.0 * best.error / largest)} % of the largest force"
+    title = f"{_style.in_words(best.name)}: {share}"
+    _style.dress(axes, "RMSE of the force [N]   (free parameters in brackets)", "", title)
+    factor = 100.0 / largest
+    to_percent, back = (lambda x: np.multiply(x, factor)), (lambda x: np.divide(x, factor))
+    shares = axes.secondary_xaxis("top", functions=(to_percent, back))
+    shares.set_xlabel("% of the largest force")
+    label = f"noise of the force, {_style.short(noise)} N"
+    return axes.axvline(noise, color=_style.BLACK, linestyle=":", linewidth=1.2, label=label)
 
 
 def cross_validation(result: CrossValidation) -> Figure:
@@ -74,7 +98,7 @@ def cross_validation(result: CrossValidation) -> Figure:
     means = [result.fit_percent(law) for law in laws]
     handles += axes.plot(means, np.arange(len(laws)), "|", markersize=16, color=_style.BLACK, label="mean", mew=2)
     _style.dress(axes, "fit of the record held out [%]", "", "Each record held out in turn")
-    axes.set_yticks(np.arange(len(laws)), laws)
+    axes.set_yticks(np.arange(len(laws)), [_style.in_words(law) for law in laws])
     low = max(min(fold.fit_percent for fold in result.folds), -20.0)
     axes.set_xlim(left=min(low - 3.0, 50.0), right=100.0)
     _style.legend_beside(figure, handles)

@@ -7,8 +7,18 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp._tables import rounded
 from jaxdamp._types import Axes, Figure
-from jaxdamp.bench import BenchRun, Evaluation, FoldedCycles, GasAndFriction, LimitCheck, as_runs, last_steady_cycle
+from jaxdamp.bench import (
+    BenchRun,
+    Evaluation,
+    FoldedCycles,
+    GasAndFriction,
+    LimitCheck,
+    Measurement,
+    as_runs,
+    last_steady_cycle,
+)
 from jaxdamp.plots import _style
 from jaxdamp.plots.loops import spread
 
@@ -98,7 +108,7 @@ def evaluation(evaluation: Evaluation, baseline: Evaluation | None = None, limit
 
 
 def gas_and_friction(found: GasAndFriction) -> Figure:
-    """Force over stroke in both directions, its even part with the gas force, and its odd part with the friction.
+    """Force over stroke in both directions, with the gas force between them, and both in numbers.
 
     Arguments:
         found: of `bench.separate_gas_and_friction`.
@@ -106,19 +116,41 @@ def gas_and_friction(found: GasAndFriction) -> Figure:
     _checks.instance("found", found, GasAndFriction, "be separated", "Take `bench.separate_gas_and_friction(run)`.")
     figure = _style.new_figure(9.0, 5.0)
     axes = figure.subplots()
-    x = 1e3 * found.stroke
-    handles = []
-    curves = (("into rebound", found.rebound), ("into compression", found.compression))
-    curves += (("even part: gas", found.even), ("odd part: friction and damping", found.odd))
-    for number, (label, force) in enumerate(curves):
-        handles += axes.plot(x, force, label=label, linewidth=1.6, **_style.line_style(number))
-    dotted: _style.Look = {"color": _style.BLACK, "linestyle": ":"}
-    handles += axes.plot(x, found.static_force(found.stroke), label="gas force by its rate", **dotted)
-    handles.append(axes.axhline(found.friction, color=_style.BLACK, linewidth=0.8, label="friction at zero velocity"))
-    _style.dress(axes, _style.STROKE, _style.FORCE, f"{found.record}: force over stroke")
+    both_directions(axes, found)
+    _style.dress(axes, _style.STROKE, _style.FORCE, f"{found.record}: {gas_and_friction_words(found)}")
     _style.cross(axes)
-    _style.legend_beside(figure, handles)
     return figure
+
+
+def both_directions(axes: Axes, found: GasAndFriction) -> None:
+    """Force over stroke [mm] into rebound and into compression without the reversals, and the static force between."""
+    cut = max(len(found.stroke) // 20, 1)  # where the stroke turns, the force is on its way from one side to the other
+    stroke, gas = found.stroke[cut:-cut], found.static_force(found.stroke)[cut:-cut]
+    curves = (
+        ("into rebound", found.rebound[cut:-cut], _style.REBOUND, "-", "bottom"),
+        ("into compression", found.compression[cut:-cut], _style.COMPRESSION, "-", "top"),
+        ("static", gas, _style.BLACK, ":", "bottom"),
+    )
+    for label, force, colour, dash, side in curves:
+        axes.plot(1e3 * stroke, force, dash, color=colour, linewidth=1.6, label=f"_{label}")
+        place, above = (1e3 * stroke[len(stroke) // 2], force[len(stroke) // 2]), 4.0 if side == "bottom" else -4.0
+        words: _style.Look = {"xytext": (0.0, above), "textcoords": "offset points", "ha": "center", "va": side}
+        axes.annotate(label, place, color=colour, fontsize="small", **words)
+    axes.margins(y=0.15)
+
+
+def gas_and_friction_words(found: GasAndFriction, between: str = ", ") -> str:
+    """Static force at mid-stroke, its rate and the friction, with their uncertainties."""
+    values = {m.quantity: m for m in found.measurements}
+    gas, friction = (_with_uncertainty(values[name]) for name in ("gas force", "friction"))
+    return f"Static {gas} N, {_style.short(1e-3 * found.gas_rate)} N/mm{between}friction {friction} N"
+
+
+def _with_uncertainty(measurement: Measurement) -> str:
+    """A measured value, and its uncertainty where it is known."""
+    if not measurement.uncertainty:
+        return _style.short(measurement.value)
+    return " ± ".join(rounded(measurement.value, measurement.uncertainty)).replace("-", "−")
 
 
 def _colours(evaluation: Evaluation) -> tuple[_style.Look, list[tuple[str, Any]]]:
@@ -212,6 +244,8 @@ def _dress(panels: Mapping[str, Axes]) -> None:
     _style.dress(panels["a"], "acceleration [m/s²]   (+ rebound)", _style.FORCE, "Force over acceleration")
     _style.dress(panels["t"], "time in the cycle, over its period [–]", _style.FORCE, "Force over time")
     for name, axes in panels.items():
+        if name not in "vx":
+            axes.set_ylabel("")
         _style.cross(axes, vertical=name != "t")
         axes.locator_params(axis="x", nbins=6)
 

@@ -57,7 +57,7 @@ def harmonic_response(result: HarmonicResponse, channels: Sequence[str] | None =
     for channel in channels:
         unit, factor = units[channel]
         label = f"[{unit} per {'m' if factor == 1.0 else 'mm'}]" if unit else "[1/m]"
-        panels.append((channel.replace("_", " "), label, factor * gains[channel]))
+        panels.append((_style.metric_words(channel), label, factor * gains[channel]))
     return _over_frequency(result, result.amplitude, panels, "road amplitude")
 
 

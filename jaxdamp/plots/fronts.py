@@ -54,7 +54,7 @@ def pareto(
         plot.set_axis_off()
     by_label = {handle.get_label(): handle for handles in drawn for handle in handles}
     _style.legend_above(figure, list(by_label.values()), 3)
-    _style.note_below(figure, [_style.typeset(front.summary)])
+    _style.note_below(figure, [_style.said(front.summary)])
     return figure
 
 

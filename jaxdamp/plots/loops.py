@@ -13,16 +13,16 @@ from jaxdamp.identify import FitResult, VehicleFit
 from jaxdamp.plots import _style
 
 
-_MOST_POINTS = 300  # of a residual
+_MOST_POINTS, _PHASES = 300, 40  # of a residual over the velocity, and over the cycle
 
 
 def fit_loops(result: FitResult, runs: BenchRun | Sequence[BenchRun] | None = None, *, most: int = 6) -> Figure:
     """Loops of force over velocity and over stroke, measured and fitted, with the residual.
 
     For each record the last full cycle is drawn. Of many records only some are drawn, spread evenly over the peak
-    velocities, and the title says so. The residual is fitted minus measured. It is reduced to about 300 points per
-    record (every nth sample over the velocity, means of n samples over the cycle), so that slow records with many
-    samples do not cover the others.
+    velocities, and the title says so. The residual is fitted minus measured. Over the velocity it is reduced to about
+    300 samples of each record, so that slow records with many samples do not cover the others; over the cycle it is
+    drawn as means over a fortieth of the period, in which noise averages out.
 
     Arguments:
         result: a fit.
@@ -48,8 +48,8 @@ def fit_loops(result: FitResult, runs: BenchRun | Sequence[BenchRun] | None = No
     handles = []
     for index, (run, force) in enumerate(zip(shown, forces, strict=True)):
         colour = _style.graded(index, len(shown))
-        part = last_steady_cycle(run)
-        time = run.time[part]
+        cycle = np.arange(len(run))[last_steady_cycle(run)]
+        part = np.append(cycle, cycle[0])  # closed
         velocity, stroke, measured, fitted = run.velocity[part], 1e3 * run.stroke[part], run.force[part], force[part]
         for axes, x in ((loops, velocity), (football, stroke)):
             axes.plot(x, measured, color=colour, linewidth=4.0, alpha=0.3, solid_capstyle="round")
@@ -57,14 +57,15 @@ def fit_loops(result: FitResult, runs: BenchRun | Sequence[BenchRun] | None = No
         residual = fitted - measured
         every = max(len(residual) // _MOST_POINTS, 1)
         over_velocity.plot(velocity[::every], residual[::every], ".", color=colour, markersize=2.5, alpha=0.6)
-        phase = _block_means((time - time[0]) * run.frequency, every)
-        over_time.plot(phase, _block_means(residual, every), color=colour, linewidth=1.0)
+        size = max(len(cycle) // _PHASES, 1)
+        phase = _block_means((run.time[cycle] - run.time[cycle[0]]) * run.frequency, size)
+        over_time.plot(phase, _block_means(residual[:-1], size), color=colour, linewidth=1.3)
         handles.append(Line2D([], [], color=colour, linewidth=2.0, label=f"{run.name} ({run.peak_velocity:.2g} m/s)"))
     label = "fitted − measured [N]"
     _style.dress(loops, _style.VELOCITY, _style.FORCE, "Force over velocity")
     _style.dress(football, _style.STROKE, _style.FORCE, "Force over stroke")
     _style.dress(over_velocity, _style.VELOCITY, label, "Residual over velocity")
-    _style.dress(over_time, "time in the cycle, over its period [–]", label, "Residual over the cycle")
+    _style.dress(over_time, "time in the cycle, over its period [–]", label, "Residual over the cycle, means of 1/40")
     for axes in (loops, football, over_velocity):
         _style.cross(axes)
         axes.locator_params(axis="x", nbins=7)

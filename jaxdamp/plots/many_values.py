@@ -91,7 +91,7 @@ def rescore(result: Rescore) -> Figure:
     changes = [100.0 * result.change(name) for name in names]
     dots = axes.plot(np.concatenate(changes), np.repeat(rows, result.roads), "o", alpha=0.5, label="a road")
     means = axes.plot([c.mean() for c in changes], rows, "|", color=_style.BLACK, markersize=14, label="mean")
-    axes.set_yticks(rows, [n.replace("_", " ") + " (minimised)" * (n == result.metric) for n in names])
+    axes.set_yticks(rows, [_style.metric_words(n) + " (minimised)" * (n == result.metric) for n in names])
     axes.set_ylim(len(names) - 0.5, -0.5)
     _style.dress(axes, "change by the tuning [%]", "", f"Ride metrics on {result.roads} other roads")
     _style.cross(axes, horizontal=False)
@@ -144,7 +144,7 @@ def damper_comparison(comparison: DamperComparison) -> Figure:
     _style.cross(axes, horizontal=False)
     _style.legend_above(figure, handles)
     legend = "With 95 % intervals; hollow where there may be no difference; thick: standard error from the parameters."
-    _style.note_below(figure, [legend, *map(_style.typeset, comparison.warnings)])
+    _style.note_below(figure, [legend, *map(_style.said, comparison.warnings)])
     return figure
 
 

@@ -51,9 +51,8 @@ def training_history(training: Training) -> Figure:
         handles += axes.plot(training.steps, values, label=label, linewidth=1.8, **_style.line_style(number))
     handles.append(axes.axvline(training.best_step, color=_style.GREY, linestyle=":", label="result"))
     axes.set_yscale("log")
-    axes.yaxis.set_major_formatter(lambda value, _: _style.short(value))
-    axes.yaxis.set_minor_formatter(lambda value, _: _style.short(value))
-    _style.dress(axes, "step", "root of the mean squared force error [N]", training.stopped)
+    _style.plain_log_axis(axes.yaxis)
+    _style.dress(axes, "step", "RMSE of the force [N]", training.stopped)
     _style.legend_beside(figure, handles)
     return figure
 

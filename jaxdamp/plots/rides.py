@@ -43,8 +43,8 @@ def ride(
         responses: a response, or responses by name, all of one kind of vehicle.
         channels: what to draw over time; the first one also as a spectrum. Left out, the acceleration of the body, the
             first stroke and the first dynamic tyre load.
-        weighting: a frequency weighting of ISO 2631-1, such as "Wk": the spectrum weighted by it is drawn dotted, and
-            the legend adds the weighted RMS.
+        weighting: a frequency weighting of ISO 2631-1, such as "Wk": the legend adds the weighted RMS, and of a single
+            response the spectrum weighted by it is drawn dotted.
         window: part of the run to draw over time [s]; if left out, the whole run, or of a long one the 3 s around its
             largest first channel. The spectrum and the RMS are of the whole run.
         reference: name of the response to draw as a broad grey line beneath the others.
@@ -81,9 +81,10 @@ def ride(
         if weighting is not None:
             dt = float(time[1] - time[0])
             weighted = metrics.weighted_rms(values, dt, weighting, method="step", remove_mean=False)
-            label += f", {weighting} {_style.short(float(weighted))}"
+            label += f", weighted by {weighting} {_style.short(float(weighted))} {unit}"
             gain = np.asarray(metrics.weighting_factor(frequency, weighting))
-            spectrum.loglog(frequency, gain**2 * density, ":", color=style["color"], linewidth=1.1)
+            if len(responses) == 1:  # more lines nobody can tell apart
+                spectrum.loglog(frequency, gain**2 * density, ":", color=style["color"], linewidth=1.1)
         handles += spectrum.loglog(frequency, density, label=label, **style)
     for axes, channel in zip(rows, channels, strict=True):
         fitted_range.shade_channel(axes, responses.values(), channel)
@@ -94,13 +95,17 @@ def ride(
     rows[-1].set_xlabel("time [s]")
     rows[0].set_xlim(start, stop)
     name = _label(first, channels[0]).split(" [")[0]
-    words = f"Spectrum of the {name}" + (f", dotted: weighted by {weighting}" if weighting else "")
+    dotted = f", dotted: weighted by {weighting}" if weighting and len(responses) == 1 else ""
+    words = f"Spectrum of the {name}{dotted}"
     _style.dress(spectrum, "frequency [Hz]", f"power spectral density [({unit})²/Hz]", words)
-    _style.frequency_axis(spectrum.xaxis)
+    _style.plain_log_axis(spectrum.xaxis)
     spectrum.set_xlim(*frequencies)
     _style.legend_above(figure, handles)
-    title = title or f"{type(first.vehicle).__name__}, ride of {float(first.time[-1] - first.time[0]):g} s"
-    rows[0].set_title(title, loc="left", fontsize="medium")
+    low, high = spectrum.get_ylim()
+    spectrum.set_ylim(max(low, 1e-6 * high), high)  # far below, a spectrum shows the window that it was estimated with
+    vehicle = _style.first_upper(_style.class_words(first.vehicle))
+    title = title or f"{vehicle}, ride of {float(first.time[-1] - first.time[0]):g} s"
+    rows[0].set_title(_style.said(title), loc="left", fontsize="medium")
     fitted_range.footnotes(figure, responses)
     return figure
 

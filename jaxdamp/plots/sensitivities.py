@@ -77,7 +77,7 @@ def sensitivity(result: Sensitivity, *, most: int = MOST) -> Figure:
         axes.barh(np.arange(len(names)), values, 0.65, color=colours)
         axes.set_yticks(np.arange(len(names)), names if column == 0 else [""] * len(names))
         axes.invert_yaxis()
-        _style.dress(axes, "change for +1 % [%]", "", metric.replace("_", " "))
+        _style.dress(axes, "change for +1 % [%]", "", _style.metric_words(metric))
         axes.grid(False, axis="y")
         _style.cross(axes, horizontal=False)
     return figure
@@ -135,5 +135,5 @@ def _band(
     axes.set_xlim(velocity[0], velocity[-1])
     axes.autoscale(axis="y")
     figure.colorbar(band, ax=axes, label="change for +100 N (upwards) [%]")
-    _style.dress(axes, _style.VELOCITY, _style.FORCE, f"{damper}: {metric.replace('_', ' ')}")
+    _style.dress(axes, _style.VELOCITY, _style.FORCE, f"{damper}: {_style.metric_words(metric)}")
     _style.cross(axes)

@@ -134,7 +134,7 @@ def _map(
     over: list[str],
     ends: Sequence["_End"],
 ) -> None:
-    """Filled contours over two axes with the smallest value marked; crosses and hatching where points failed."""
+    """Filled contours over two axes, the smallest value, lines of so much more; crosses where points failed."""
     x, y = (data[name].values for name in over)
     values, failed = (data[name].transpose(over[1], over[0]).values for name in (metric, "failed"))
     if min(values.shape) < 2:
@@ -147,8 +147,11 @@ def _map(
         allowed = np.ma.masked_where(np.any(beyond, axis=0), shown) if beyond else shown
         if allowed.count():
             row, column = np.unravel_index(np.ma.argmin(allowed), shown.shape)
-            least = f"smallest{' within the limits' * bool(beyond)}: {_style.short(float(values[row, column]))}"
-            label = f"{least}{_unit(data, metric)}"
+            smallest = float(values[row, column])
+            edge = any(at in (0, size - 1) and size > 2 for at, size in zip((row, column), shown.shape, strict=True))
+            label = f"smallest{' within the limits' * bool(beyond)}: {_style.short(smallest)}{_unit(data, metric)}"
+            label += ", at the edge: widen the grid" * edge
+            _more_than(plot, x, y, shown, smallest)
             plot.plot(x[column], y[row], "o", color="white", markeredgecolor=_style.BLACK, label=label, clip_on=False)
         else:
             plot.plot([], [], " ", label="no point within the limits")
@@ -165,6 +168,15 @@ def _map(
     plot.set_ylim(y.min(), y.max())
     handles = [*plot.get_legend_handles_labels()[0], *hatched]
     _style.legend_above(figure, handles, _legend_columns(handles))
+
+
+def _more_than(plot: Axes, x: np.ndarray, y: np.ndarray, values: np.ma.MaskedArray, smallest: float) -> None:
+    """White lines where a result is so many percent above the smallest."""
+    levels = [share for share in (2.0, 5.0, 10.0, 20.0, 50.0, 100.0) if smallest * (1.0 + share / 100.0) < values.max()]
+    if smallest > 0.0 and levels:
+        heights = [smallest * (1.0 + share / 100.0) for share in levels]
+        lines = plot.contour(x, y, values, heights, colors="white", linewidths=0.8)
+        plot.clabel(lines, fmt=dict(zip(heights, map(_style.percent, levels), strict=True)), fontsize="small")
 
 
 def _legend_columns(handles: Sequence[Any]) -> int:
@@ -192,7 +204,7 @@ def _ends(data: object, spans: Mapping[str, tuple[float, float]]) -> list[_End]:
         for value, above in zip(span, (False, True), strict=True):
             if np.isfinite(value):
                 side = "above" if above else "below"
-                label = f"{name.replace('_', ' ')} {side} {_style.short(value)}{_unit(data, name)}"
+                label = f"{_style.metric_words(name)} {side} {_style.short(value)}{_unit(data, name)}"
                 ends.append(_End(name, value, above, label))
     return ends
 
@@ -223,7 +235,7 @@ def _words(data: Any, name: str) -> str:
     """The last part of a name in words; the whole path if another axis has the same last part."""
     last = name.rpartition(".")[2]
     alike = [axis for axis in map(str, data.coords) if axis.rpartition(".")[2] == last and axis != name]
-    return (name.replace(".", " ") if alike else last).replace("_", " ")
+    return _style.metric_words(name if alike else last)
 
 
 def _unit(data: Any, name: str) -> str:

@@ -1,9 +1,9 @@
 """Pages of results: one self-contained HTML file with the verdict in words, tables, pictures and versions.
 
 - Pages: `bench_report(evaluation, preflight)`, `fit_report(comparison)`, `vehicle_fit_report(result)`,
-  `ride_report(responses)`, `tuning_report(result)`, `chain_report(comparison, rides, tuned)` of the whole chain,
-  `sweep_report(data)`, `result_report(result)` of any result; each gives a `Report`, to which more can
-  be added before `write(path)`.
+  `vehicle_comparison_report(comparison)`, `ride_report(responses)`, `tuning_report(result)`,
+  `chain_report(comparison, rides, tuned)` of the whole chain, `sweep_report(data)`, `result_report(result)` of any
+  result; each gives a `Report`, to which more can be added before `write(path)`.
 - Your own page: `Report`, with the sections `add_records`, `add_evaluation`, `add_fits`, `add_rides`, `add_tuning`.
 - Tables of these pages: `records_table`, `ride_records_table`, `ride_tables`, `fitted_range_table`, `range_use_table`.
 """
@@ -15,12 +15,13 @@ from jaxdamp.report.benches import (
     add_evaluation as add_evaluation,
     baseline_table as baseline_table,
     bench_report,
+    bench_verdict as bench_verdict,
     law_evaluation as law_evaluation,
     table_report as table_report,
 )
 from jaxdamp.report.chains import chain_report
 from jaxdamp.report.fits import (
-    add_fits,
+    add_fits as add_fits,
     add_other_fits as add_other_fits,
     failure_sentences as failure_sentences,
     fit_report,
@@ -46,13 +47,16 @@ from jaxdamp.report.rides import (
 )
 from jaxdamp.report.sweeps import sweep_report
 from jaxdamp.report.tunings import add_tuning as add_tuning, tuning_report
-from jaxdamp.report.vehicle_fits import ride_records_table as ride_records_table, vehicle_fit_report
+from jaxdamp.report.vehicle_fits import (
+    ride_records_table as ride_records_table,
+    vehicle_comparison_report,
+    vehicle_fit_report,
+)
 
 
 __all__ = [
     "Report",
     "Table",
-    "add_fits",
     "bench_report",
     "chain_report",
     "fit_report",
@@ -60,6 +64,7 @@ __all__ = [
     "ride_report",
     "sweep_report",
     "tuning_report",
+    "vehicle_comparison_report",
     "vehicle_fit_report",
 ]
 

@@ -11,21 +11,13 @@ class Attempts:
     Arguments:
         check: called before each part; what it raises is raised, such as an interruption.
         message: what an error says, in words.
-        words: a sentence for the reader of the page, such as with options of a command instead of arguments.
 
     Attributes:
-        words: as given.
         troubles: the parts that failed, completely or partly, and why, in words.
     """
 
-    def __init__(
-        self,
-        check: Callable[[], None] = lambda: None,
-        message: Callable[[Exception], str] = str,
-        words: Callable[[str], str] = str,
-    ) -> None:
+    def __init__(self, check: Callable[[], None] = lambda: None, message: Callable[[Exception], str] = str) -> None:
         self.troubles: list[str] = []
-        self.words = words
         self._check, self._message = check, message
 
     @contextmanager

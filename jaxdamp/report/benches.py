@@ -107,16 +107,29 @@ def bench_verdict(
     if evaluation.velocities:
         velocity = max(evaluation.velocities)
         for setting in evaluation.settings:
-            rebound, compression, ratio = (
-                evaluation.get(name, setting=setting, velocity=velocity).cell
-                for name in ("rebound force", "compression force", "rebound/compression ratio")
-            )
             where = f"Setting {setting}, at" if setting else "At"
-            force, share = Column("", spec=".4g").text, f" (ratio {ratio})" if ratio is not None else ""
-            parts = ((rebound, "in rebound"), (compression, "in compression"))
-            words = " and ".join(f"{force(cell)} N {side}" for cell, side in parts if cell is not None)
-            sentences += [f"{where} {velocity:.4g} m/s: {words}{share}."] if words else []
+            words = _forces_in_words(evaluation, setting, velocity)
+            sentences += [f"{where} {velocity:.4g} m/s: {words}."] if words else []
     return sentences + ([f"{preflight.summary}."] if preflight else [])
+
+
+def _forces_in_words(evaluation: Evaluation, setting: str, velocity: float) -> str:
+    """The forces of a setting at a velocity without gas force and zero error of the load cell, where these are known.
+
+    They would shift the ratio of rebound to compression.
+    """
+    separated = evaluation.gas_and_friction.get(setting)
+    static = 0.0 if separated is None else separated.gas_force
+    forces = {}
+    for side in ("rebound", "compression"):
+        found = evaluation.get(f"{side} force", setting=setting, velocity=velocity)
+        shown = dataclasses.replace(found, value=found.value - static).cell
+        forces |= {} if shown is None else {side: shown}
+    words = " and ".join(f"{Column('').text(force)} N in {side}" for side, force in forces.items())
+    if len(forces) == 2 and float(forces["compression"]):
+        words += f", ratio {abs(float(forces['rebound']) / float(forces['compression'])):.2f}"
+    off = f", without the static force of {static:.0f} N" if static else ", gas force included"
+    return words + off if words else ""
 
 
 def law_evaluation(law: AbstractDamper, evaluation: Evaluation) -> Evaluation:

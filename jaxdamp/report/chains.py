@@ -56,15 +56,20 @@ def chain_report(
     >>> ride = simulate(car, roads.cosine_bump(0.05, start=0.2, duration=0.25), duration=1.0)
     >>> tuned = tune.minimise("rms_dynamic_tyre_load", car, roads.white("C", 20.0), over=["damper.**"])
     >>> page = report.chain_report(comparison, {"a bump": {"bilinear": ride}}, tuned)  # page.write("chain.html")
-    >>> tuned.summary.replace(">", "&gt;") in page.to_html()
+    >>> "tyre load variation, RMS" in page.to_html()
     True
     """
     report = Report(title, folder, attempts)
+    best, *others = fit_verdict(report, comparison, baseline)
     report.verdict(
-        *([tuned.summary] if tuned else []),
-        *fit_verdict(report, comparison, baseline),
+        *([tuned.verdict.sentence] if tuned else []),
+        best,
         *(f"{road}: {sentence}" for road, ride in rides.items() for sentence in ride_verdict(ride)),
-        *(bench_verdict(evaluation, preflight) if evaluation else []),
+        more=[
+            *([tuned.ending] if tuned else []),
+            *others,
+            *(bench_verdict(evaluation, preflight) if evaluation else []),
+        ],
     )
     report.sheet(lambda: comparison.plot("sheet", baseline=baseline), comparison.verdict[0], "damper_sheet")
     if tuned is not None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from jaxdamp import plots, rig
 from jaxdamp._tables import Table
+from jaxdamp._words import in_words
 from jaxdamp.bench import BenchRun, Preflight
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Band, Comparison, CrossValidation, FitResult, Rung, rounded, without_machine
@@ -93,7 +94,8 @@ def fit_report(
     True
     """
     report = Report(title, folder, attempts)
-    report.verdict(*fit_verdict(report, comparison, baseline), f"{preflight.summary}." if preflight else "")
+    best, *others = fit_verdict(report, comparison, baseline)
+    report.verdict(best, f"{preflight.summary}." if preflight else "", more=others)
     report.sheet(lambda: comparison.plot("sheet", baseline=baseline), comparison.verdict[0], "damper_sheet")
     records = (*comparison.best.result.runs, *comparison.held_out) if runs is None else tuple(runs)
     add_records(report, records, comparison.held_out, remarks, preflight)
@@ -226,9 +228,7 @@ def _add_curves(report: Report, comparison: Comparison, baseline: AbstractDamper
     drawn = dict(list(laws.items())[:MOST_CURVES])
     note = ""
     if len(laws) > len(drawn):
-        others = ", ".join(list(laws)[MOST_CURVES:])
-        count = len(laws) - len(drawn)
-        note = f"Drawn are {best.name} and the laws with the smallest errors. The other {count}: {others}."
+        note = f"Not drawn, with larger errors: {', '.join(map(in_words, list(laws)[MOST_CURVES:]))}."
     if baseline is not None:
         drawn |= _with_curves(report, {BASELINE: baseline}, points)
     machine, runs = best.result.rig, best.result.runs

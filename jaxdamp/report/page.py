@@ -15,11 +15,12 @@ import numpy as np
 from jaxdamp._display import display
 from jaxdamp._tables import Table
 from jaxdamp._types import Figure
+from jaxdamp._words import said
 from jaxdamp.report.attempts import Attempts
 
 
 PIXELS = 86  # of a page for an inch of a picture: the widest ones fill the page
-COLOURS = 64  # of a picture: nobody sees the difference, and the file has a quarter of the size
+COLOURS = 40  # of a picture: nobody sees the difference, and the file has a quarter of the size
 DOTS = 130  # of a picture in an inch
 _PAGE = """<!DOCTYPE html>
 <html lang="en">
@@ -42,6 +43,7 @@ details {{ border-bottom: 1px solid var(--line); padding: 0.5em 0; }}
 summary {{ cursor: pointer; }}
 a {{ color: var(--mark); }}
 nav {{ color: var(--soft); margin: 1em 0; }}
+.verdict details {{ border: 0; color: var(--soft); }}
 .verdict {{ border-left: 5px solid var(--mark); background: var(--box); padding: 0.3em 1em; font-size: 1.07em; }}
 .table {{ overflow-x: auto; margin: 1em 0; }}
 table {{ border-collapse: collapse; font-variant-numeric: tabular-nums; overflow-wrap: normal; }}
@@ -101,7 +103,7 @@ class Report:
     """
 
     def __init__(self, title: str, folder: Path | None = None, attempts: Attempts | None = None) -> None:
-        self.title = title
+        self.title = said(title)
         self.attempts = Attempts() if attempts is None else attempts
         self._folder = folder
         self._headings: list[str] = []
@@ -111,7 +113,7 @@ class Report:
 
     def heading(self, text: str) -> None:
         """Start a section; the page begins with links to all of them. Below a sheet sections are folded."""
-        self._headings.append(display().words(text))
+        self._headings.append(said(display().words(text)))
         self._sections.append([])
 
     def sheet(self, figure: Callable[[], Figure], finding: str, name: str) -> None:
@@ -134,9 +136,18 @@ class Report:
     def _add(self, block: str) -> None:
         (self._sections[-1] if self._sections else self._blocks).append(block)
 
-    def verdict(self, *sentences: str) -> None:
-        """The result in words, each sentence on a line, in a box; nothing if there are no words."""
-        lines = "".join(f"<p>{self._escaped(sentence)}</p>" for sentence in sentences if sentence)
+    def verdict(self, *sentences: str, more: Sequence[str] = ()) -> None:
+        """The result in words, each sentence on a line, in a box; nothing if there are no words.
+
+        Arguments:
+            sentences: what the page says.
+            more: what else is known of it, folded.
+        """
+        lines, folded = (
+            "".join(f"<p>{self._escaped(sentence, said)}</p>" for sentence in part if sentence)
+            for part in (sentences, more)
+        )
+        lines += f"<details><summary>more</summary>{folded}</details>" if folded else ""
         if lines:
             self._add(f'<div class="verdict">{lines}</div>')
 
@@ -148,14 +159,14 @@ class Report:
     def points(self, items: Sequence[str]) -> None:
         """A list of remarks; nothing if it is empty."""
         if items:
-            self._add(_points([display().words(self.attempts.words(item)) for item in items]))
+            self._add(_points([display().words(item) for item in items]))
 
-    def _escaped(self, sentence: str) -> str:
-        return html.escape(display().words(self.attempts.words(sentence)))
+    def _escaped(self, sentence: str, worded: Callable[[str], str] = str) -> str:
+        return html.escape(worded(display().words(sentence)))
 
     def table(self, table: Table) -> None:
         """A table."""
-        self._add(f'<div class="table">{table.to_html()}</div>')
+        self._add(f'<div class="table">{table.to_html(words=True)}</div>')
 
     def part(self, what: str) -> AbstractContextManager[None]:
         """A part that may fail; the page then reports that `what` could not be made."""
@@ -170,7 +181,7 @@ class Report:
             name: of the file, such as "ride.png".
         """
         with self.part(f"The picture {name}"):
-            words = display().words(caption)
+            words = said(display().words(caption))
             image = self._image(figure() if callable(figure) else figure, words, name)
             self._add(f"<figure>{image}<figcaption>{html.escape(words)}</figcaption></figure>")
 
@@ -191,7 +202,7 @@ class Report:
         """
         links = [f'<a href="#part-{n}">{html.escape(text)}</a>' for n, text in enumerate(self._headings, 1)]
         contents = [f"<nav>{' · '.join(links)}</nav>"] * (len(links) > 1)
-        troubles = [_points(self.attempts.troubles)] if self.attempts.troubles else []
+        troubles = [_points(list(map(display().words, self.attempts.troubles)))] if self.attempts.troubles else []
         sections = [
             self._section(n, text, blocks)
             for n, (text, blocks) in enumerate(zip(self._headings, self._sections, strict=True), 1)
@@ -231,7 +242,7 @@ def _png(figure: Figure) -> bytes:
     finally:
         figure.set_canvas(canvas)
         figure.dpi = dots
-    few = drawn.convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    few = drawn.convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE, 1, dither=Image.Dither.NONE)
     few.save(small, format="png", optimize=True)
     return small.getvalue()
 

@@ -4,13 +4,13 @@ from collections.abc import Callable
 
 from jaxdamp._results import AbstractResult
 from jaxdamp.bench import Evaluation
-from jaxdamp.identify import Comparison, VehicleFit
+from jaxdamp.identify import Comparison, VehicleComparison, VehicleFit
 from jaxdamp.report.benches import bench_report
 from jaxdamp.report.fits import fit_report
 from jaxdamp.report.page import Report
 from jaxdamp.report.rides import ride_report
 from jaxdamp.report.tunings import tuning_report
-from jaxdamp.report.vehicle_fits import vehicle_fit_report
+from jaxdamp.report.vehicle_fits import vehicle_comparison_report, vehicle_fit_report
 from jaxdamp.simulation import Response
 from jaxdamp.tune import TuneResult
 
@@ -20,6 +20,7 @@ _PAGES: dict[type, Callable[..., Report]] = {
     Evaluation: bench_report,
     Response: ride_report,
     TuneResult: tuning_report,
+    VehicleComparison: vehicle_comparison_report,
     VehicleFit: vehicle_fit_report,
 }
 

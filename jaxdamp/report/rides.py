@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from jaxdamp import plots
+from jaxdamp._display import display
 from jaxdamp._tables import Table, percent_change, typeset_unit
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.metrics import comfort_reaction
@@ -94,7 +95,8 @@ def ride_verdict(responses: Mapping[str, Response]) -> list[str]:
             for name, response in others
         ]
     units = baseline.metric_units()
-    said = [f"{WORDS[g]} {values[first][g]:.3g} {typeset_unit(units[names[0]])}" for g, names in goals.items()]
+    shown = {goal: display().of(units[names[0]]) for goal, names in goals.items()}
+    said = [f"{WORDS[g]} {s(values[first][g]):.3g} {typeset_unit(s.unit)}" for g, s in shown.items()]
     feel = ""
     if "comfort" in goals and typeset_unit(units[goals["comfort"][0]]) == "m/s²":
         feel = f" ISO 2631-1 calls such an acceleration {' or '.join(comfort_reaction(values[first]['comfort']))}."

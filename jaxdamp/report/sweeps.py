@@ -7,6 +7,7 @@ from typing import Any
 from jaxdamp import plots
 from jaxdamp._tables import percent_change, typeset_unit
 from jaxdamp._types import DataArray, Dataset
+from jaxdamp._words import path_words
 from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.page import Report
 from jaxdamp.sweeps import without_effect
@@ -48,9 +49,7 @@ def sweep_report(
     if len(data["failed"].dims) <= MOST_AXES:
         for name in data.data_vars:
             metric = str(name)
-            report.picture(
-                lambda m=metric: plots.sweep(data, m, limits=limits), metric.replace("_", " "), f"{metric}.png"
-            )
+            report.picture(lambda m=metric: plots.sweep(data, m, limits=limits), path_words(metric), f"{metric}.png")
     else:
         report.text(f"Grids of more than {MOST_AXES} axes are not drawn.")
     report.table(data.jaxdamp.table())
@@ -77,7 +76,7 @@ def best_points(
     sentences = [f"{count} of {total} points are within all limits."] if limits else []
     idle = without_effect(data)
     sentences += [
-        f"{_words(over)} has no effect on {_words(name)}: no value of it is better than another."
+        f"{path_words(over)} has no effect on {path_words(name)}: no value of it is better than another."
         for name, flat in idle.items()
         for over in flat
     ]
@@ -97,15 +96,14 @@ def _smallest(
     """The smallest value of a result, where it is, and its change from the baseline."""
     values = data[name].where(allowed)
     place = values.isel(values.argmin(...)).coords
-    where = ", ".join(f"{axis} = {_in_words(data, axis, place[axis])}" for axis in axes)
+    where = ", ".join(f"{path_words(axis)} = {_in_words(data, axis, place[axis])}" for axis in axes)
     change = None if baseline is None else percent_change(float(baseline[name]), float(values.min()))
     if baseline is not None and change is not None:
         where += f", {change:+.1f} % from the baseline ({_in_words(data, name, baseline[name])})"
-    return f"Smallest {_words(name)}: {_in_words(data, name, values.min())} at {where}."
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
+    ends = {axis: {float(data[axis].min()), float(data[axis].max())} for axis in axes if data.sizes.get(axis, 0) > 2}
+    at_end = [path_words(axis) for axis, both in ends.items() if float(place[axis]) in both]
+    widen = f" That is an end of {' and of '.join(at_end)}: widen the grid." if at_end else ""
+    return f"Smallest {path_words(name)}: {_in_words(data, name, values.min())} at {where}.{widen}"
 
 
 def _in_words(data: Dataset, name: str, value: Any) -> str:

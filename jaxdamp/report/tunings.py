@@ -45,7 +45,7 @@ def tuning_report(
     True
     """
     report = Report(title, folder, attempts)
-    report.verdict(result.summary)
+    report.verdict(result.verdict.sentence, more=[result.ending])
     report.sheet(lambda: result.plot("sheet"), result.verdict.sentence, "ride_sheet")
     report.heading(result.verdict.outcome.value)
     add_tuning(report, result, rescored)

@@ -8,7 +8,7 @@ import numpy as np
 from jaxdamp import plots
 from jaxdamp._tables import Column, Table
 from jaxdamp.bench import RideRecord
-from jaxdamp.identify import VehicleFit, without_machine
+from jaxdamp.identify import VehicleComparison, VehicleFit, without_machine
 from jaxdamp.parameters import get
 from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.page import Report
@@ -42,6 +42,47 @@ def vehicle_fit_report(
     """
     report = Report(title, folder, attempts)
     report.verdict(_summary(result))
+    _add_fit(report, result, remarks)
+    return report
+
+
+def vehicle_comparison_report(
+    comparison: VehicleComparison,
+    *,
+    title: str = "Vehicles fitted to records of their motion",
+    remarks: Sequence[str] | None = None,
+    folder: Path | None = None,
+    attempts: Attempts | None = None,
+) -> Report:
+    """A page on the fits of several vehicles: the recommended one, why, and its fit.
+
+    Arguments:
+        comparison: of `identify.compare(vehicles, records)`.
+        title: of the page.
+        remarks: on the records; their notes if left out.
+        folder: folder for the pictures as separate files; without it they are only in the page.
+        attempts: collects parts that fail; a new one if left out.
+    """
+    report, best = Report(title, folder, attempts), comparison.best
+    report.verdict(*comparison.verdict)
+    report.heading("How good the vehicles are")
+    report.table(comparison.table())
+    report.points([f"{failure.name} could not be fitted. {failure.reason}" for failure in comparison.failed])
+    report.picture(comparison.plot, "Errors of the vehicles", "ladder.png")
+    report.table(best.scores_table())
+    report.heading(f"The recommended vehicle: {best.name}")
+    report.text(_summary(best.result))
+    _add_fit(report, best.result, remarks)
+    for rung in comparison.rungs:
+        if rung is not best:
+            report.heading(rung.name)
+            report.table(rung.result.table())
+            report.points(rung.result.warnings)
+    return report
+
+
+def _add_fit(report: Report, result: VehicleFit, remarks: Sequence[str] | None) -> None:
+    """The sections on one fitted vehicle."""
     report.heading("Warnings")
     report.points(result.warnings)
     if not result.warnings:
@@ -74,7 +115,6 @@ def vehicle_fit_report(
             f"Force over velocity of {path}, beside its bench records without what the machine adds",
             f"{path.replace('.', '_')}_force_velocity.png",
         )
-    return report
 
 
 def ride_records_table(records: Sequence[RideRecord]) -> Table:

@@ -9,7 +9,7 @@ from jaxdamp.rig.constant_velocity import (
 )
 from jaxdamp.rig.dynamic_stiffness import DynamicStiffness as DynamicStiffness, dynamic_stiffness
 from jaxdamp.rig.machine import Readings as Readings, Rig, gas_and_friction as gas_and_friction
-from jaxdamp.rig.marching import march as march, solve_law as solve_law
+from jaxdamp.rig.marching import Followed as Followed, march as march, solve_law as solve_law
 from jaxdamp.rig.response import AbstractLawEngine as AbstractLawEngine, StartsInMotionWarning, respond
 from jaxdamp.rig.sensor import Sensor
 

@@ -12,11 +12,12 @@ from jaxtyping import Array, ArrayLike, Complex, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._periodic import Shot, shoot, steady_state, with_derivatives
+from jaxdamp._results import drawn_by
 from jaxdamp._sharded import varying_as
 from jaxdamp._steady_cycles import AbstractSteadyCycles, checked_points, is_steady, span
 from jaxdamp._tables import Column, Table, plain
 from jaxdamp._traced import behind
-from jaxdamp._types import Figure, Scalar, ScalarLike, Signal, State
+from jaxdamp._types import Scalar, ScalarLike, Signal, State
 from jaxdamp.dampers import AbstractDamper
 
 
@@ -100,11 +101,9 @@ class DynamicStiffness(AbstractSteadyCycles):
         rows = np.stack([np.asarray(values).ravel() for values in numbers], axis=1)
         return Table("Dynamic stiffness", columns, tuple(tuple(plain(row)) for row in rows))
 
-    def plot(self) -> Figure:
-        """Stiffness, loss angle and damping over frequency, a curve for each amplitude (`plots.dynamic_stiffness`)."""
-        from jaxdamp import plots
-
-        return plots.dynamic_stiffness(self)
+    plot = drawn_by(
+        "dynamic_stiffness", "Stiffness, loss angle and damping over frequency, a curve for each amplitude."
+    )
 
 
 @final

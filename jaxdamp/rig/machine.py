@@ -11,10 +11,14 @@ from jaxtyping import Array
 from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar, Signal, SignalLike, State
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.parameters import Module, as_float, check_parameters, nonnegative, parameter, positive, readable, setting
-from jaxdamp.rig.marching import march, slopes
+from jaxdamp.parameters import AbstractDeclared, Domain, as_float, nonnegative, parameter, positive, setting
+from jaxdamp.rig.marching import NOTHING, Followed, march, slopes, step_and_rate
 from jaxdamp.rig.response import respond
-from jaxdamp.rig.sensor import delayed, lagged
+from jaxdamp.rig.sensor import delayed, delayed_straight, lagged
+
+
+def _not_positive() -> Domain:
+    return not_positive
 
 
 not_positive = dataclasses.replace(
@@ -25,6 +29,7 @@ not_positive = dataclasses.replace(
     to_raw=lambda value, scale: nonnegative.to_raw(-value, scale),
     lower=-jnp.inf,
     upper=0.0,
+    remade=(_not_positive, ()),
 )
 
 
@@ -41,7 +46,7 @@ class Readings(NamedTuple):
 
 
 @final
-class Rig(Module):
+class Rig(AbstractDeclared):
     """A test machine as the force channel of its records sees it: gas, friction, mass, heat, delay, lag and offsets.
 
     With ϑ, the temperature above that of the law's own numbers, and x = x_measured − x₀:
@@ -49,6 +54,13 @@ class Rig(Module):
         F(t) = F_law(x, v) (1 − κ ϑ) + (G + k x)(1 + γ ϑ) + F_f tanh(v / v_f) + m v'
         ϑ' = h (F_law (1 − κ ϑ) + F_f tanh(v / v_f)) v − c ϑ
         F_measured(t) = F₀ + (F behind a first-order lag)(t − delay)
+        u' = (u_measured − u) / command_lag
+
+    u is the command that a law has which takes one, such as a `Scheduled`: the coil current or the valve follows what
+    was measured with a lag. It stands here, beside the other lags of a bench, and not in the law, whose force is that
+    at a command it has: in a vehicle the controller has an actuator of its own, `Controlled(actuator_lag=...)`, and
+    with a lag in the law too it would count twice. Between samples the measured command runs straight, and the lag is
+    exact for that.
 
     Everything is zero by default, so that `Rig()` shows the force of the law. The gas does no lasting work and gives no
     heat. It differentiates by all parameters of law and rig, and works under `jit` and `vmap`. For a delay of
@@ -85,14 +97,9 @@ class Rig(Module):
     gas_temperature_slope: Number = parameter("1/K", "γ, rise of gas force for each kelvin", default=0.0)
     heating: Number = parameter("K/J", "h, one over the heat capacity", nonnegative, default=0.0)
     cooling: Number = parameter("1/s", "c, one over the time constant of cooling", nonnegative, default=0.0)
+    command_lag: Number = parameter("s", "time constant of the actuator behind the command", nonnegative, default=0.0)
     initial_rise: Number = parameter("K", "ϑ at the start, above the reference temperature", default=0.0)
     reference_temperature: Number = setting("K", "temperature of the law's own numbers", positive, default=293.15)
-
-    def __check_init__(self) -> None:
-        check_parameters(self)
-
-    def __repr__(self) -> str:
-        return readable(self)
 
     def force(
         self,
@@ -102,10 +109,12 @@ class Rig(Module):
         velocity: SignalLike | None = None,
         *,
         temperature: SignalLike | None = None,
+        command: SignalLike | None = None,
         substeps: int = 1,
     ) -> Signal:
         """Force [N] that the load cell would show while the machine moves a damper; the arguments are `readings`'s."""
-        return self.readings(law, time, stroke, velocity, temperature=temperature, substeps=substeps).force
+        beside = {"temperature": temperature, "command": command}
+        return self.readings(law, time, stroke, velocity, **beside, substeps=substeps).force
 
     def readings(
         self,
@@ -115,6 +124,7 @@ class Rig(Module):
         velocity: SignalLike | None = None,
         *,
         temperature: SignalLike | None = None,
+        command: SignalLike | None = None,
         substeps: int = 1,
     ) -> Readings:
         """What the sensors would show without noise while the machine moves a damper.
@@ -126,28 +136,26 @@ class Rig(Module):
             velocity: [m/s], shape (time,); by central differences of the stroke if it is left out.
             temperature: measured temperature of the damper [K], shape (time,), in place of that which the dissipated
                 energy gives.
+            command: measured command of a law that takes one, shape (time,), which acts behind the actuator's lag.
             substeps: steps of a law with states from one instant to the next.
 
         Returns:
             Force and temperature.
 
         Raises:
-            ValueError: what `jaxdamp.respond` refuses; a temperature that is not finite or of another length.
+            ValueError: what `jaxdamp.respond` refuses; a temperature or a command that is not finite or of another
+                length.
         """
         time, stroke = as_float(time, "time"), as_float(stroke, "stroke")
-        dt = (time[-1] - time[0]) / (time.size - 1)
-        rate = jnp.asarray(jnp.gradient(stroke, dt)) if velocity is None else as_float(velocity, "velocity")
-        if temperature is not None:
-            temperature = as_float(temperature, "temperature")
-            if temperature.shape != time.shape:
-                value = f"of shape {temperature.shape} for time {time.shape}"
-                _checks.refuse("temperature", "be as long as `time`", value)
-            _checks.finite("temperature", temperature)
+        dt, rate = step_and_rate(time, stroke, None if velocity is None else as_float(velocity, "velocity"))
+        temperature, command = (
+            None if values is None else _channel(name, values, time)
+            for name, values in (("temperature", temperature), ("command", command))
+        )
         motion = self.delayed_motion(self.effects(), dt, stroke, rate)
-        temperatures = temperature if law.traits().temperature_dependent else None
-        start = (law if temperatures is None else law.at_temperature(temperatures[0])).initial_state()
-        inside = motion[0] - self.stroke_offset
-        law_force = respond(law, time, inside, motion[1], state=start, temperature=temperatures, substeps=substeps)
+        acting = Followed(temperature, self.acting(self.effects(), dt, command)).of(law)
+        start, inside = acting.first(law).initial_state(), motion[0] - self.stroke_offset
+        law_force = respond(law, time, inside, motion[1], state=start, **acting._asdict(), substeps=substeps)
         return _readings(self, self.effects(), law_force, dt, *motion, temperature)
 
     def march(
@@ -157,14 +165,23 @@ class Rig(Module):
         dt: Scalar,
         stroke: Signal,
         velocity: Signal,
-        temperature: Signal | None = None,
+        followed: Followed = NOTHING,
         substeps: int = 1,
         state: State | None = None,
     ) -> Readings:
         """`readings` without its checks, for use inside compiled functions, with the `effects` known outside."""
         stroke, velocity = self.delayed_motion(effects, dt, stroke, velocity)
-        force = march(law, dt, stroke - self.stroke_offset, velocity, substeps, temperature, state)
-        return _readings(self, effects, force, dt, stroke, velocity, temperature)
+        acting = followed._replace(command=self.acting(effects, dt, followed.command))
+        force = march(law, dt, stroke - self.stroke_offset, velocity, substeps, acting, state)
+        return _readings(self, effects, force, dt, stroke, velocity, followed.temperature)
+
+    def acting(self, effects: tuple[str, ...], dt: Scalar, command: Signal | None) -> Signal | None:
+        """The command that the law has, behind the actuator's lag, at the instants whose force the channel shows."""
+        if command is not None and "command_lag" in effects:
+            command = lagged(command, self.command_lag / dt)
+        if command is not None and "delay" in effects:
+            command = delayed_straight(command, self.force_delay / dt)
+        return command
 
     def delayed_motion(
         self, effects: tuple[str, ...], dt: Scalar, stroke: Signal, velocity: Signal
@@ -180,10 +197,20 @@ class Rig(Module):
             "inertia": (self.moving_mass,),
             "heat": (self.heating, self.initial_rise),
             "lag": (self.force_lag,),
+            "command_lag": (self.command_lag,),
             "delay": (self.force_delay,),
         }
         values_of = {effect: [_checks.concrete(value) for value in values] for effect, values in numbers.items()}
         return tuple(effect for effect, values in values_of.items() if any(v is None or v.any() for v in values))
+
+
+def _channel(name: str, values: SignalLike, time: Signal) -> Signal:
+    """A channel beside the motion, checked."""
+    channel = as_float(values, name)
+    if channel.shape != time.shape:
+        _checks.refuse(name, "be as long as `time`", f"of shape {channel.shape} for time {time.shape}")
+    _checks.finite(name, channel)
+    return channel
 
 
 def gas_and_friction(rig: Rig, stroke: Array, velocity: Array) -> tuple[Array, Array]:

@@ -1,6 +1,6 @@
 """The states of a law carried over a prescribed stroke, without checks."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import equinox as eqx
 import jax
@@ -11,12 +11,42 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._jacobian import Mode
 from jaxdamp._sharded import varying_as
-from jaxdamp._types import Signal, State
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp._types import ScalarLike, Signal, State
+from jaxdamp.dampers import AbstractDamper, at_command
 
 
 if TYPE_CHECKING:
     import diffrax
+
+
+class Followed(NamedTuple):
+    """Channels measured beside the motion that a law follows, in place of the numbers that it states; None without one.
+
+    Attributes:
+        temperature: of the oil [K], shape (time,), for laws that depend on it.
+        command: in the unit of the law's command, shape (time,), straight between the instants.
+    """
+
+    temperature: Signal | None = None
+    command: Signal | None = None
+
+    def of(self, law: AbstractDamper) -> "Followed":
+        """Only what the law follows."""
+        return self if law.traits().temperature_dependent else self._replace(temperature=None)
+
+    def first(self, law: AbstractDamper) -> AbstractDamper:
+        """The law at the first instant."""
+        return law_at(law, *(None if channel is None else channel[0] for channel in self.of(law)))
+
+
+NOTHING = Followed()
+_Ends = tuple[Array, Array, Array, Array, Array | None]  # stroke, velocity, stroke, velocity, command between
+
+
+def law_at(law: AbstractDamper, temperature: ScalarLike | None, command: ScalarLike | None) -> AbstractDamper:
+    """The law at a measured temperature [K] and command, each if there is one."""
+    law = law if temperature is None else law.at_temperature(temperature)
+    return law if command is None else at_command(law, command)
 
 
 _STIFF = "Stiff laws need an implicit solver, `diffrax.Kvaerno5()`, or their own steps: leave `engine` out."
@@ -64,7 +94,7 @@ def march(
     stroke: Signal,
     velocity: Signal,
     substeps: int,
-    temperature: Signal | None = None,
+    followed: Followed = NOTHING,
     state: State | None = None,
 ) -> Signal:
     """`respond` without its checks, for use inside compiled functions, from this state if one is given.
@@ -75,10 +105,10 @@ def march(
         stroke: [m], positive in extension, shape (time,).
         velocity: [m/s], shape (time,).
         substeps: steps from one instant to the next.
-        temperature: [K], shape (time,), for laws that depend on one; within a step it is the mean of both ends.
+        followed: measured channels that the law follows; a step takes the mean of both ends.
         state: of the law at the first instant; its own initial state if left out.
     """
-    return march_states(law, dt, stroke, velocity, substeps, temperature, state)[0]
+    return march_states(law, dt, stroke, velocity, substeps, followed, state)[0]
 
 
 @eqx.filter_jit
@@ -88,34 +118,31 @@ def march_states(
     stroke: Signal,
     velocity: Signal,
     substeps: int,
-    temperature: Signal | None = None,
+    followed: Followed = NOTHING,
     state: State | None = None,
 ) -> tuple[Signal, State]:
     """Forces [N] and the states at the last instant, as `march`."""
-    warm = None if temperature is None or not law.traits().temperature_dependent else temperature
+    warm, commands = followed.of(law)
 
-    def at(temperature: Array | None) -> AbstractDamper:
-        return law if temperature is None else law.at_temperature(temperature)
+    def force(x: Array, v: Array, state: Array, warm: Array | None, command: Array | None) -> Array:
+        return law_at(law, warm, command).force(x, v, state)
 
-    def force(x: Array, v: Array, state: Array, temperature: Array | None) -> Array:
-        return at(temperature).force(x, v, state)
-
-    state = at(None if warm is None else warm[0]).initial_state() if state is None else state
+    state = followed.first(law).initial_state() if state is None else state
     if state.size == 0:
-        return jax.vmap(force, (0, 0, None, 0))(stroke, velocity, state, warm), state
+        return jax.vmap(force, (0, 0, None, 0, 0))(stroke, velocity, state, warm, commands), state
     fine_x = _refine(stroke, dt * velocity, substeps)
     fine_v = _refine(velocity, dt * slopes(velocity, dt), substeps)
     h = dt / substeps
 
-    def sample(state: Array, inputs: tuple[tuple[Array, Array, Array, Array], Array | None]) -> tuple[Array, Array]:
-        ends, own = inputs[0], at(inputs[1])
+    def sample(state: Array, inputs: tuple[_Ends, Array | None]) -> tuple[Array, Array]:
+        ends, warm = inputs
 
-        def step(state: Array, ends: tuple[Array, Array, Array, Array]) -> tuple[Array, None]:
-            x0, v0, x1, v1 = ends
-            return own.advance(x0, v0, x1, v1, state, h), None
+        def step(state: Array, ends: _Ends) -> tuple[Array, None]:
+            x0, v0, x1, v1, command = ends
+            return law_at(law, warm, command).advance(x0, v0, x1, v1, state, h), None
 
         if substeps == 1:
-            after = step(state, (ends[0][0], ends[1][0], ends[2][0], ends[3][0]))[0]
+            after = step(state, jax.tree.map(lambda end: end[0], ends))[0]
         else:
             after = jax.lax.scan(step, state, ends)[0]
         return after, state  # the state before: XLA would compute that after the step twice, also to store it
@@ -123,12 +150,27 @@ def march_states(
     def grouped(values: Array) -> Array:
         return values.reshape(-1, substeps)
 
-    grid = (grouped(fine_x[:-1]), grouped(fine_v[:-1]), grouped(fine_x[1:]), grouped(fine_v[1:]))
+    middles = None
+    if commands is not None:
+        shares = (jnp.arange(substeps, dtype=commands.dtype) + 0.5) / substeps
+        middles = commands[:-1, None] + jnp.diff(commands)[:, None] * shares[None, :]
+    grid = (grouped(fine_x[:-1]), grouped(fine_v[:-1]), grouped(fine_x[1:]), grouped(fine_v[1:]), middles)
     between = None if warm is None else 0.5 * (warm[:-1] + warm[1:])
     state = varying_as(state, grid, eqx.filter(law, eqx.is_array), h)
     last, states = jax.lax.scan(sample, state, (grid, between))
     states = jnp.concatenate([states, last[None]])
-    return jax.vmap(force)(stroke, velocity, states, warm), last
+    return jax.vmap(force)(stroke, velocity, states, warm, commands), last
+
+
+def step_and_rate(time: Signal, stroke: Signal, velocity: Signal | None) -> tuple[Array, Signal]:
+    """Sample spacing, and the velocity: by central differences of the stroke if there is none."""
+    return _step_and_rate(time, stroke, velocity, np.asarray(time.size - 1, time.dtype))
+
+
+@jax.jit
+def _step_and_rate(time: Signal, stroke: Signal, velocity: Signal | None, steps: Array) -> tuple[Array, Signal]:
+    dt = (time[-1] - time[0]) / steps  # an argument: by a constant XLA multiplies with its rounded reciprocal
+    return dt, jnp.asarray(jnp.gradient(stroke, dt)) if velocity is None else velocity
 
 
 def slopes(values: Signal, dt: Array) -> Signal:

@@ -11,10 +11,12 @@ from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._forked import refuse_fork
 from jaxdamp._types import Signal, SignalLike, State
 from jaxdamp.dampers import (
     AbstractDamper,
     Motion,
+    check_commands,
     has_fitted_range,
     range_use,
     require_finite_force,
@@ -22,7 +24,7 @@ from jaxdamp.dampers import (
     warn_outside,
 )
 from jaxdamp.parameters import as_float
-from jaxdamp.rig.marching import march_states, solve_law
+from jaxdamp.rig.marching import Followed, march_states, solve_law, step_and_rate
 
 
 if TYPE_CHECKING:
@@ -49,6 +51,7 @@ class _Options(TypedDict, total=False):
 
     state: Float[ArrayLike, " states"] | None
     temperature: Float[ArrayLike, "..."] | None
+    command: Float[ArrayLike, "..."] | None
     substeps: int
     engine: AbstractLawEngine | None
     method: "str | diffrax.AbstractSolver | None"
@@ -89,6 +92,7 @@ def respond(
     state: Float[ArrayLike, " states"] | None = None,
     return_state: bool = False,
     temperature: Float[ArrayLike, "..."] | None = None,
+    command: Float[ArrayLike, "..."] | None = None,
     substeps: int = 1,
     engine: AbstractLawEngine | None = None,
     method: "str | diffrax.AbstractSolver | None" = None,
@@ -115,6 +119,10 @@ def respond(
         return_state: whether to return the states at the last instant too.
         temperature: measured temperature of the oil [K], one value or shape (time,), in place of that which a
             `TemperatureScaled` states and that which a `Heated` computes.
+        command: coil current, voltage or clicks, one value or shape (time,), in place of that which the law states, in
+            its unit; straight between the instants. The law has it at once: `Rig(command_lag=...).force(law, ...)` has
+            an actuator with a lag. Values up to a twentieth of the levels' range outside of the levels of a `Scheduled`
+            law, such as noise, take the nearest level.
         substeps: steps from one instant to the next for laws with states, between which stroke and velocity are
             interpolated by cubics. The error of a step falls with its square.
         engine: `simulation.Exponential(substeps=...)`, the steps that the laws bring, as when it is left out; or
@@ -131,8 +139,9 @@ def respond(
     Raises:
         ValueError: time not uniform or not increasing, shapes that differ, fewer than two instants; a stroke outside
             the limits of a law (`law.stroke_limits`); a force that is not finite, as where the motion leaves the data
-            that a law was made from; a solver that gives up; a temperature beside a law that does
-            not depend on it, or beside an engine; a state of another size, or beside an engine.
+            that a law was made from; a solver that gives up; a temperature or a command beside a law that does not
+            depend on it, or beside an engine; a command outside the levels of the law; a state of another size, or
+            beside an engine.
 
     >>> from jaxdamp.dampers import Linear
     >>> time = np.linspace(0.0, 1.0, 1001)
@@ -140,22 +149,24 @@ def respond(
     >>> round(float(force[0]), 6)
     120.0
     """
+    refuse_fork()
     check_module("law", law, (AbstractDamper,), "respond(law, time, stroke, velocity)")
     instants, time, stroke = _checks.concrete(time), as_float(time), as_float(stroke)
     _check_record(instants, time, stroke, velocity)
     _checks.untraced("substeps", substeps, "The number of steps is part of a compiled program: give a plain number.")
     if substeps < 1:
         _checks.refuse("substeps", "be 1 or more", substeps)
-    dt = (time[-1] - time[0]) / (time.size - 1)
-    rate = jnp.asarray(jnp.gradient(stroke, dt)) if velocity is None else as_float(velocity)
+    dt, rate = step_and_rate(time, stroke, None if velocity is None else as_float(velocity))
     _refuse_strokes(law, stroke)
     if method is not None:
         _refuse_method(method, engine)
     solver = None if isinstance(method, str) else method
     if engine is not None or solver is not None:
-        _refuse_beside_engine(temperature, substeps, state, return_state)
+        _refuse_beside_engine(temperature, command, substeps, state, return_state)
     if temperature is not None:
         temperature = _of_instants(law, temperature, time)
+    if command is not None:
+        command = _commands(law, command, time)
     if state is None:
         _warn_of_motion(law, rate)
     last: State | None = None
@@ -165,8 +176,9 @@ def respond(
     elif solver is not None:
         force = solve_law(law, time, stroke, rate, solver, rtol, atol)
     else:
-        begin = None if state is None else _checked_state(law, state, temperature)
-        force, last = march_states(law, dt, stroke, rate, substeps, temperature, begin)
+        followed = Followed(temperature, command)
+        begin = None if state is None else _checked_state(law, state, followed)
+        force, last = march_states(law, dt, stroke, rate, substeps, followed, begin)
     require_finite_force(law, force, "over the whole motion")
     _warn_of_range(law, stroke, rate, force)
     return (force, last) if return_state and last is not None else force
@@ -189,21 +201,22 @@ def _check_record(instants: np.ndarray | None, time: Signal, stroke: Signal, vel
             _checks.refuse("time", "increase in equal steps", value, "Resample the record to a uniform rate.")
 
 
-def _refuse_beside_engine(temperature: object, substeps: int, state: object, return_state: bool) -> None:
+def _refuse_beside_engine(
+    temperature: object, command: object, substeps: int, state: object, return_state: bool
+) -> None:
     """Refuse what only the steps of the laws have."""
     if substeps != 1:
         must = "be left out beside an engine, which has its own or chooses them"
         _checks.refuse("substeps", must, substeps, "Write `engine=simulation.Exponential(substeps=...)`.")
-    others = {"temperature": temperature, "state": state, "return_state": return_state or None}
+    others = {"temperature": temperature, "command": command, "state": state, "return_state": return_state or None}
     for name, value in others.items():
         if value is not None:
             _checks.refuse(name, "be left out beside an engine", value, "Leave out `engine`.")
 
 
-def _checked_state(law: AbstractDamper, state: object, temperature: Signal | None) -> State:
+def _checked_state(law: AbstractDamper, state: object, followed: Followed) -> State:
     """The states, as many as the law has."""
-    warm_law = law if temperature is None else law.at_temperature(temperature[0])
-    begin, shape = as_float(state), warm_law.initial_state().shape
+    begin, shape = as_float(state), followed.first(law).initial_state().shape
     if begin.shape != shape:
         _checks.refuse("state", f"have the shape {shape} for {type(law).__name__}", f"of shape {begin.shape}")
     _checks.finite("state", begin)
@@ -233,6 +246,14 @@ def _of_instants(law: AbstractDamper, temperature: Float[ArrayLike, "..."], time
         _checks.refuse("temperature", "be one value or as long as `time`", f"of shape {jnp.shape(temperature)}")
     _checks.positive("temperature", temperature, "It is in kelvin.")
     return jnp.broadcast_to(as_float(temperature), time.shape)
+
+
+def _commands(law: AbstractDamper, command: Float[ArrayLike, "..."], time: Signal) -> Signal:
+    """A command at every instant, for a law that takes one."""
+    check_commands("command", law, command)
+    if jnp.shape(command) not in ((), time.shape):
+        _checks.refuse("command", "be one value or as long as `time`", f"of shape {jnp.shape(command)}")
+    return jnp.broadcast_to(as_float(command), time.shape)
 
 
 def _warn_of_range(law: AbstractDamper, *channels: Signal) -> None:

@@ -11,10 +11,11 @@ from jaxtyping import Array
 from jaxdamp import _checks
 from jaxdamp._limits import within
 from jaxdamp._types import Number, Scalar, ScalarLike, Signal
-from jaxdamp.parameters import Module, check_parameters, nonnegative, parameter, positive, readable
+from jaxdamp.parameters import AbstractDeclared, nonnegative, parameter, positive, readable
 from jaxdamp.rig.marching import hermite, slopes
 
 
+@jax.jit
 def delayed(values: Signal, samples: Scalar) -> Signal:
     """A signal later by a number of samples, not necessarily whole; its first and last values stand beyond its ends."""
     last = values.size - 1
@@ -25,6 +26,14 @@ def delayed(values: Signal, samples: Scalar) -> Signal:
     return hermite(ends, places - before.astype(places.dtype))
 
 
+@jax.jit
+def delayed_straight(values: Signal, samples: Scalar) -> Signal:
+    """As `delayed`, for a signal with steps, which runs straight between samples."""
+    places = jnp.arange(values.size, dtype=values.dtype)
+    return jnp.interp(places - samples, places, values)
+
+
+@jax.jit
 def lagged(values: Signal, samples: Scalar) -> Signal:
     """Y of τ y' + y = signal, from a settled start, exact for straight lines between samples.
 
@@ -46,7 +55,7 @@ def lagged(values: Signal, samples: Scalar) -> Signal:
 
 
 @final
-class Sensor(Module):
+class Sensor(AbstractDeclared):
     """A sensor with gain, zero error, lag, delay and high-pass: which of them are given is what it has.
 
         shown(t) = gain · h(t − delay) + offset,  h = high-pass of the channel behind a first-order lag
@@ -96,9 +105,6 @@ class Sensor(Module):
         for name, value in numbers.items():
             setattr(self, name, (1.0 if name == "gain" else 0.0) if value is None else value)
         self.given = tuple(name for name, value in numbers.items() if value is not None)
-
-    def __check_init__(self) -> None:
-        check_parameters(self)
 
     def __repr__(self) -> str:
         return readable(self) if not self.given else f"Sensor({', '.join(self._words())})"

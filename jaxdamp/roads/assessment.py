@@ -7,10 +7,9 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Contents, Table, plain, with_unit
 from jaxdamp._traced import of_known_numbers
-from jaxdamp._types import Figure
 from jaxdamp.roads.iso_classes import (
     HIGHEST_SPATIAL_FREQUENCY,
     LOWEST_SPATIAL_FREQUENCY,
@@ -99,11 +98,7 @@ class RoughnessAssessment(AbstractResult):
         """`verdict`."""
         return self.verdict
 
-    def plot(self) -> Figure:
-        """The spectrum with its straight line and the classes (`plots.roughness_spectrum`)."""
-        from jaxdamp import plots
-
-        return plots.roughness_spectrum(self)
+    plot = drawn_by("roughness_spectrum", "The spectrum with its straight line and the classes.")
 
     def table(self) -> Table:
         """A row for each band."""

@@ -3,13 +3,15 @@
 from collections.abc import Sequence
 from typing import final
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._limits import at_least, at_most
-from jaxdamp._types import Scalar, ScalarLike, SignalLike, VectorLike
+from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike, VectorLike
 from jaxdamp.roads._composed import AbstractOnOneRoad, agreed_speed
 from jaxdamp.roads.base import AbstractRoad, Columns
 
@@ -29,12 +31,15 @@ class Delayed(AbstractOnOneRoad):
 
     def heights_at(self, time: SignalLike) -> Float[Array, "time wheels"]:
         """The height [m] under each wheel at each `time` [s]: all wheels of the first axle, then of the second, ..."""
-        time = jnp.asarray(time, self.delay.dtype)
+        heights = self.road.height(self._passed(jnp.asarray(time, self.delay.dtype)))
+        return _by_axle(heights, self.delay.size)
+
+    @eqx.filter_jit
+    def _passed(self, time: Signal) -> Float[Array, " times"]:
+        """The times at which the road reaches each axle, one axle after the other."""
         # a record is level before its first sample; the road itself refuses given times before it
         begin = at_most(time, self.road.span[0])
-        passed = at_least(time[None, :] - self.delay[:, None], begin[None, :])
-        heights = self.road.height(passed.reshape(-1)).reshape(self.delay.size, time.size, self.road.wheels)
-        return jnp.moveaxis(heights, 0, 1).reshape(time.size, self.wheels)
+        return at_least(time[None, :] - self.delay[:, None], begin[None, :]).reshape(-1)
 
     @property
     def wheels(self) -> int:
@@ -47,6 +52,13 @@ class Delayed(AbstractOnOneRoad):
         within = self.road.columns
         delays = self.delay if within.delays is None else (self.delay[:, None] + within.delays[None, :]).reshape(-1)
         return Columns("delayed", within.tracks, delays)
+
+
+@jax.jit(static_argnames="axles")
+def _by_axle(heights: Float[Array, "times tracks"], axles: int) -> Float[Array, "time wheels"]:
+    """A row for each time with the tracks of all axles, from rows for the times of one axle after the other."""
+    parts = heights.reshape(axles, -1, heights.shape[1])
+    return jnp.moveaxis(parts, 0, 1).reshape(parts.shape[1], -1)
 
 
 @final

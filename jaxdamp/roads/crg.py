@@ -103,7 +103,10 @@ def _surface(path: Path) -> Any:
     try:
         import pyopencrg
     except ModuleNotFoundError as missing:
-        raise ModuleNotFoundError("OpenCRG files need pyopencrg: pip install 'jaxdamp[io]'.") from missing
+        raise ModuleNotFoundError(
+            f"{path}: .crg files need the library 'pyopencrg'. Install it with pip install 'jaxdamp[io]', or export "
+            "the road as text of position, height."
+        ) from missing
     try:
         surface = pyopencrg.read(str(path))
     except ValueError as fault:

@@ -279,18 +279,25 @@ def iso8608(
     density = roughness(road_class)
     length = _repeat_length(band, speed, duration, length)
     first, last = _first_and_last(band, length)
-    turn, above = uniform(seed, (2, last - first + 1))
+    phase, size = _phases_and_sizes(uniform(seed, (2, last - first + 1)))
     return Iso8608(
         roughness_psd=jnp.asarray(density, float),
         waviness=jnp.asarray(waviness, float),
         driven_at=jnp.asarray(speed, float),
-        phase=2.0 * math.pi * turn,
-        relative_amplitude=jnp.ones_like(turn) if amplitudes == "fixed" else rayleigh(above),
+        phase=phase,
+        relative_amplitude=jnp.ones_like(phase) if amplitudes == "fixed" else size,
         length=length,
         band=band,
         ramp=float(ramp),
         amplitudes=amplitudes,
     )
+
+
+@jax.jit
+def _phases_and_sizes(drawn: Float[Array, "2 waves"]) -> tuple[Float[Array, " waves"], Float[Array, " waves"]]:
+    """Phases [rad] and Rayleigh-distributed relative amplitudes from two rows of numbers between 0 and 1."""
+    turn, above = drawn
+    return 2.0 * math.pi * turn, rayleigh(above)
 
 
 def _first_and_last(band: tuple[float, float], length: float) -> tuple[int, int]:

@@ -138,19 +138,19 @@ def autoregressive(noise: Float[Array, " samples"], correlation: Scalar) -> Floa
 
 @final
 class FilteredNoise(AbstractProcess):
-    """The shaping filter at equally spaced samples.
+    """The shaping filter at equally spaced samples."""
 
-    Arguments:
-        deviation: standard deviation of the heights [m].
-        correlation: of neighbouring samples.
-    """
-
-    deviation: Scalar
-    correlation: Scalar
+    deviation: Scalar  # standard deviation of the heights [m]
+    correlation: Scalar  # of neighbouring samples
 
     def draw(self, seed: int | Array, count: int) -> Float[Array, " samples"]:
         """So many heights [m]."""
-        return self.deviation * autoregressive(normal(seed, (count,)), self.correlation)
+        return _filtered(self.deviation, self.correlation, normal(seed, (count,)))
+
+
+@jax.jit
+def _filtered(deviation: Scalar, correlation: Scalar, noise: Float[Array, " samples"]) -> Float[Array, " samples"]:
+    return deviation * autoregressive(noise, correlation)
 
 
 def iso8608_filtered(

@@ -17,7 +17,7 @@ from jaxdamp.simulation.notes import (
     range_sentences as range_sentences,
 )
 from jaxdamp.simulation.observer import MetricObserver as MetricObserver, recorded as recorded
-from jaxdamp.simulation.response import Response
+from jaxdamp.simulation.response import Response as Response
 from jaxdamp.simulation.ride import Ride
 from jaxdamp.simulation.ride_metrics import (
     comfort,
@@ -29,7 +29,7 @@ from jaxdamp.simulation.run import simulate
 from jaxdamp.simulation.stability import substeps_needed
 from jaxdamp.simulation.stationary import DEVIATIONS as DEVIATIONS, stationary_notes as stationary_notes
 from jaxdamp.simulation.step_size import CoarseStepWarning, RunCheck as RunCheck, TracedStepWarning
-from jaxdamp.simulation.stepper import AbstractStepper
+from jaxdamp.simulation.stepper import AbstractStepper, ControlledStepper as ControlledStepper, Controller as Controller
 from jaxdamp.simulation.wheels import AxleTiming as AxleTiming, moves_axles as moves_axles
 
 
@@ -41,7 +41,6 @@ __all__ = [
     "CoarseStepWarning",
     "Equations",
     "Exponential",
-    "Response",
     "Ride",
     "RoadInput",
     "TracedStepWarning",

@@ -36,7 +36,7 @@ class Adaptive(AbstractEngine):
     >>> from jaxdamp import roads, simulate, vehicles
     >>> bump = roads.cosine_bump(0.05, start=0.1, duration=0.25)
     >>> simulate(vehicles.presets.quarter_car_000(), bump, duration=0.5, engine=Adaptive(rtol=1e-6))
-    Response of a QuarterCar over 0.5 s, 501 instants, 10 channels
+    Response of a QuarterCar over 0.5 s, 501 instants, 12 channels
     """
 
     solver: Any = None

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from typing import NamedTuple, final
 
 import equinox as eqx
+import numpy as np
 from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
@@ -197,8 +198,16 @@ def chosen_engine(
     return engine, dt
 
 
-def check_control(engine: AbstractEngine, system: System, dt: float) -> None:
-    """Refuse an engine that cannot run a controller, and times of it that are not whole steps."""
+def check_control(engine: AbstractEngine, system: System, dt: float, duration: float, *, part: bool = False) -> None:
+    """Refuse an engine that cannot run a controller, times of it that are not whole steps, and a delay without end.
+
+    Arguments:
+        engine: of the run.
+        system: the vehicle.
+        dt: spacing of the instants [s].
+        duration: of the run [s].
+        part: whether it is a part of a longer one.
+    """
     control: ControlLoop | None = system.control
     if control is None:
         return
@@ -212,3 +221,40 @@ def check_control(engine: AbstractEngine, system: System, dt: float) -> None:
             must = f"be a whole number of steps of {dt:g} s"
             near = max(round(steps), 1) * dt
             _checks.refuse(name, must, f"{value:g} s", f"Pass `{name}={near:g}`, or another `dt`.")
+    if not part and control.delay >= duration:
+        remedy = "No command of the controller would be applied."
+        _checks.refuse("delay", f"be shorter than the run of {duration:g} s", f"{control.delay:g} s", remedy)
+
+
+def check_demands(
+    system: System, time: Signal, motion: Float[Array, "time n"], commands: Float[Array, "time commands"] | None
+) -> None:
+    """Refuse a policy that demanded what is no number, while the vehicle moved as it should.
+
+    Arguments:
+        system: the vehicle.
+        time: of the instants [s].
+        motion: at the instants.
+        commands: of the dampers, then the demanded forces [N]; None without a controller.
+    """
+    control: ControlLoop | None = system.control
+    if control is None or commands is None:
+        return
+    known, moved = _checks.concrete(commands), _checks.concrete(motion)
+    if known is None or moved is None:
+        return
+    demands = known[:, len(control.ports) :]
+    bad = ~np.isfinite(demands)
+    if not bad.any():
+        return
+    first = int(np.argmax(bad.any(axis=1)))
+    before = moved[max(first - 1, 0)]
+    if np.all(np.abs(before) < SANE):  # else the vehicle was the first
+        number = int(np.argmax(bad[first]))
+        damper, policy = system.layout.ports[control.ports[number]], control.commanded_by[number]
+        remedy = "Look for a division by zero, or a root or power of a negative number, among its signals and states."
+        found = f"{demands[first, number]} N for {damper} at the sample before {time[first]:g} s"
+        _checks.refuse(f"policy ({policy})", "demand finite forces", found, remedy)
+
+
+SANE = 1e6  # m, m/s

@@ -205,7 +205,7 @@ class Exponential(AbstractFixedStep):
     >>> from jaxdamp import roads, simulate, vehicles
     >>> bump = roads.cosine_bump(0.05, start=0.1, duration=0.25)
     >>> simulate(vehicles.presets.quarter_car_000(), bump, duration=1.0, engine=Exponential(dt=5e-4))
-    Response of a QuarterCar over 1 s, 2001 instants, 10 channels
+    Response of a QuarterCar over 1 s, 2001 instants, 12 channels
     """
 
     dt: float | None = eqx.field(static=True, default=None)

@@ -19,20 +19,13 @@ from jaxdamp.vehicles import System
 
 
 class Cycle(NamedTuple):
-    """The samples of a period: channels, motion in SI units, forces of the elements [N], heights and rates of the road.
-
-    Attributes:
-        channels: shape (samples, channels).
-        motion: shape (samples, n).
-        force: shape (samples, ports).
-        road, road_rate: shape (samples, wheels).
-    """
+    """The samples of a period in SI units."""
 
     channels: Float[Array, "samples channels"]
     motion: Float[Array, "samples n"]
-    force: Float[Array, "samples ports"]
-    road: Float[Array, "samples wheels"]
-    road_rate: Float[Array, "samples wheels"]
+    force: Float[Array, "samples ports"]  # of the elements [N]
+    road: Float[Array, "samples wheels"]  # heights [m]
+    road_rate: Float[Array, "samples wheels"]  # [m/s]
 
 
 @final

@@ -1,6 +1,7 @@
-"""Notes on a response: laws beyond the range of their fit, tyres in tension."""
+"""Notes on a response: laws beyond the range of their fit, tyres in tension, commands at their limits."""
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -9,8 +10,37 @@ from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._types import Signal
+from jaxdamp.control import ControlLoop
 from jaxdamp.dampers import AbstractDamper, Motion, RangeUse, has_fitted_range, range_use, sentence
 from jaxdamp.vehicles import AbstractVehicle, ChannelKind, PortForm, System
+
+
+class Delivery(NamedTuple):
+    """What a damper gave of the force that a controller demanded of it.
+
+    Attributes:
+        share: mean of force × demand over the mean of demand²; 1 where each demand was met, near 0 of on-off policies,
+            which demand far more than there is.
+        resisting: share of the time in which the demand resisted the motion of the damper, which alone it can do.
+    """
+
+    share: float
+    resisting: float
+
+
+def deliveries(channel: Callable[[str], Signal], dampers: Sequence[str]) -> dict[str, Delivery]:
+    """What controlled dampers gave of what was demanded of them.
+
+    Arguments:
+        channel: the values of a channel by its name.
+        dampers: names of those under control.
+    """
+    found = {}
+    for name in dampers:
+        demand, force, rate = (np.asarray(channel(f"{name}_{word}")) for word in ("demand", "force", "velocity"))
+        share = np.mean(force * demand) / np.mean(demand**2) if np.any(demand) else 1.0
+        found[name] = Delivery(float(share), float(np.mean(demand * rate >= 0.0)))
+    return found
 
 
 FAR = 0.01  # share of the time outside the fitted range from which a verdict cannot be trusted
@@ -112,6 +142,45 @@ def tyres_in_tension(
         return ()
     remedy = "Pass `tyre_lifts=True` to the vehicle if its wheels can leave the road."
     return (f"Wheel loads fell below zero, as linear tyres pull on the road: {'; '.join(pulled)}. {remedy}",)
+
+
+ALWAYS, OFTEN = 0.9, 0.3  # shares of the time that are said: at an end of the levels, at the limit of the rate
+NEAR = 0.05  # of the range of the levels: nearer to an end, the limits of a command are rounded
+
+
+def commands_at_limits(
+    system: System, time: Float[np.ndarray, " time"], commands: Float[np.ndarray, "time commands"]
+) -> tuple[str, ...]:
+    """Dampers whose commands stood at one end of their levels most of the time, or changed as fast as they can.
+
+    Arguments:
+        system: the vehicle with its controller.
+        time: of the instants [s].
+        commands: of the dampers, then the demanded forces [N].
+    """
+    control: ControlLoop = system.control
+    texts = []
+    for number, (port, levels) in enumerate(zip(control.ports, control.levels(system.laws), strict=True)):
+        command, name = commands[:, number], system.layout.ports[port].replace("_", " ")
+        low, high = float(levels[0]), float(levels[-1])
+        near = NEAR * (high - low)
+        for word, level, at_end in (("lowest", low, command < low + near), ("highest", high, command > high - near)):
+            if (share := float(np.mean(at_end))) > ALWAYS:
+                at_most = "no softer" if word == "lowest" else "no harder"
+                texts.append(
+                    f"The command of the {name} stood at its {word} level, {level:g}, {100.0 * share:.0f} % of the "
+                    f"time: the damper can be {at_most} than it is there."
+                )
+        if control.rate_limit is not None and time.size > 1:
+            rate = np.diff(command) / (time[1] - time[0])
+            rising, falling = float(control.rate_limit.rising), float(control.rate_limit.falling)
+            share = float(np.mean((rate > 0.999 * rising) | (rate < -0.999 * falling)))
+            if share > OFTEN:
+                texts.append(
+                    f"The command of the {name} changed as fast as its actuator can, {rising:g} up and {falling:g} "
+                    f"down per second, {100.0 * share:.0f} % of the time."
+                )
+    return tuple(texts)
 
 
 def far_outside(uses: Mapping[str, Sequence[RangeUse]]) -> list[str]:

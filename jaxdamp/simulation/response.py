@@ -1,7 +1,9 @@
 """What a vehicle did on a road: motion, forces, channels with units."""
 
 import dataclasses
+import os
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, final
 
 import equinox as eqx
@@ -11,13 +13,21 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from jaxdamp import _checks
+from jaxdamp._guesses import Elsewhere
 from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._tables import Contents, Table, with_unit
 from jaxdamp._types import Dataset, Figure, Scalar, Signal
 from jaxdamp.dampers import RangeUse
 from jaxdamp.metrics import Metric
 from jaxdamp.simulation.energy import absorbed_by, energy_balance
-from jaxdamp.simulation.notes import range_sentences, range_uses, tyres_in_tension
+from jaxdamp.simulation.notes import (
+    Delivery,
+    commands_at_limits,
+    deliveries,
+    range_sentences,
+    range_uses,
+    tyres_in_tension,
+)
 from jaxdamp.simulation.ride_metrics import Comfort, comfort, comfort_table, comfort_units, metrics_table, ride_metrics
 from jaxdamp.simulation.wheels import AxleTiming
 from jaxdamp.vehicles import AbstractVehicle, LinearMap, System
@@ -85,6 +95,7 @@ class Response(eqx.Module, AbstractResult):
     whole: "Response | None" = None
     begin: Int[Array, ""] | None = None
     commands: Float[Array, "time commands"] | None = None
+    histogram = Elsewhere("`jaxdamp.metrics.velocity_histogram(response['damper_velocity'], edges)`")
     _computed: _Channels = eqx.field(init=False, repr=False, default_factory=_Channels)
 
     @property
@@ -107,17 +118,20 @@ class Response(eqx.Module, AbstractResult):
         return repr(self)
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """`notes`."""
-        return self.notes
-
-    @property
     def notes(self) -> tuple[str, ...]:
-        """Tyres that pulled on the road, dampers that left the fitted range of their laws; empty while JAX traces."""
+        """Tyres that pulled on the road, dampers beyond the fitted range of their laws, commands at their limits.
+
+        Empty while JAX traces.
+        """
         if _checks.concrete(self.motion) is None:
             return ()
         tyres = tyres_in_tension(self.system, np.asarray(self.time), self.__getitem__)
-        return (*tyres, *range_sentences(self.range_use()))
+        limits = ()
+        if self.commands is not None:
+            limits = commands_at_limits(self.system, np.asarray(self.time), np.asarray(self.commands))
+        return (*tyres, *range_sentences(self.range_use()), *limits)
+
+    warnings = notes
 
     @property
     def descriptions(self) -> dict[str, str]:
@@ -208,6 +222,14 @@ class Response(eqx.Module, AbstractResult):
         """Energy that each element has taken in [J], by its name: `simulation.absorbed_by`."""
         return absorbed_by(self)
 
+    def delivered(self) -> dict[str, Delivery]:
+        """What each damper under a controller gave of the force demanded of it; empty without a controller.
+
+        `share` of the demanded force, and the share of the time in which the demand was `resisting` the motion at all.
+        A demand is that of the last sample, and its command comes later by delay and lag.
+        """
+        return deliveries(self.__getitem__, [name for name in self.dampers if f"{name}_demand" in self.units])
+
     def range_use(self) -> dict[str, list[RangeUse]]:
         """What each damper did beside the range that its law was fitted to; only of laws that have one."""
         return range_uses(self.vehicle, self.system.form, self.motion, self.road, self.road_rate, self.port_force)
@@ -250,6 +272,18 @@ class Response(eqx.Module, AbstractResult):
         from jaxdamp.plots import ride, ride_sheet
 
         return plotted(kind, {"ride": ride, "sheet": ride_sheet}, self, **options)
+
+    def animate(self, path: str | os.PathLike[str], *, before: "Response | None" = None, title: str = "") -> Path:
+        """Write a page in which the vehicle moves over its road, with the forces at its dampers (`plots.animation`).
+
+        Arguments:
+            path: the file to write, NAME.html.
+            before: another response at the same instants, shown beside this one.
+            title: of the page; made from the vehicle if left out.
+        """
+        from jaxdamp.plots import animation
+
+        return animation(self if before is None else {"before": before, "after": self}, path, title=title)
 
     def to_xarray(self) -> Dataset:
         """All channels as an `xarray.Dataset` over time, with units."""

@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._forked import refuse_fork
 from jaxdamp._jacobian import Mode
 from jaxdamp._many_points import outside_domains
 from jaxdamp._traced import is_batched, look_behind
@@ -108,14 +109,16 @@ class Ride(eqx.Module):
         if isinstance(road, WhiteRoad):
             refuse_controller(vehicle, "a ride on a white road")
             for name, value in (("duration", duration), ("substeps", substeps), ("engine", engine)):
-                _refuse_run(name, value)
+                if value is not None:
+                    remedy = "Leave it out: the answer is that of the stationary motion, without a run."
+                    _checks.refuse(name, "not be given on a white road", value, remedy)
             self.road, self.heights, self.dt = road, None, 1e-3 if dt is None else dt
             self.engine, self.layout = Exponential(), MemoryLayout.ARRAY
             self.metrics = _stationary(vehicle, chosen, all_of_them=metrics is None)
             return
         engine, self.dt = chosen_engine(engine, Exponential(substeps=substeps), dt, substeps)
-        check_control(engine, vehicle.system(), self.dt)
         _, self.heights = sampled(vehicle, road, duration, self.dt)
+        check_control(engine, vehicle.system(), self.dt, (self.heights.shape[0] - 1) * self.dt)
         self.road = road if delays_by_itself(vehicle, road) else None
         self.engine = engine.prepared(run_check(vehicle, vehicle.system(), road, self.heights, self.dt))
         self.layout = self.engine.layout(2 * len(vehicle.coordinates), side_by_side=False)
@@ -176,11 +179,8 @@ class Ride(eqx.Module):
 
         Only a compiled function that is batched afterwards, `jax.vmap(jax.jit(ride))`, needs to be told so.
         """
-        return self._compiled_as(self.engine.layout(2 * len(self.vehicle.coordinates), side_by_side=True))
-
-    def _compiled_as(self, layout: MemoryLayout) -> "Ride":
-        other = copy.copy(self)
-        object.__setattr__(other, "layout", layout)
+        other, states = copy.copy(self), 2 * len(self.vehicle.coordinates)
+        object.__setattr__(other, "layout", self.engine.layout(states, side_by_side=True))
         return other
 
     def printed_side_by_side(self) -> "Ride | None":
@@ -227,6 +227,7 @@ class Ride(eqx.Module):
 
     def __call__(self, point: Mapping[str, Any] | None = None) -> dict[str, Scalar]:
         """The metrics by name, with other values of the parameters at these paths."""
+        refuse_fork()
         point = dict(point or {})
         for name, value in point.items():
             if np.shape(value) != ():
@@ -238,7 +239,8 @@ class Ride(eqx.Module):
         ride = self.side_by_side() if is_batched((self, point)) else self
         with self.engine.naming_derivatives():
             values = _drive(ride, point)
-        if isinstance(self.road, WhiteRoad) and any(_infinite(value) for value in values.values()):
+        known = [number for value in values.values() if (number := _checks.concrete(value)) is not None]
+        if isinstance(self.road, WhiteRoad) and not all(np.all(np.isfinite(number)) for number in known):
             in_motion(replace(self.vehicle, point), self.road)  # which refuses laws that have no stationary motion
         return MetricValues.with_units(values, self.units)
 
@@ -250,11 +252,6 @@ class Ride(eqx.Module):
                 must = "be one number for one car" if shapes[path] == () else f"be of shape {shapes[path]}"
                 remedy = "For several cars use `jaxdamp.sweep(ride, {...})`, or `jax.vmap(ride)`."
                 _checks.refuse(f"point[{name!r}]", must, f"of shape {shape}", remedy)
-
-
-def _infinite(value: Scalar) -> bool:
-    number = _checks.concrete(value)
-    return number is not None and not np.all(np.isfinite(number))
 
 
 @eqx.filter_jit
@@ -272,13 +269,6 @@ def _drive(ride: Ride, point: dict[str, Any]) -> dict[str, Scalar]:
     with one_at_a_time() if ride.layout is MemoryLayout.SCALARS else nullcontext():
         outcome = ride.engine.run(equations, heights, ride.dt, settled(equations.system, heights[0]), observer)
     return observer.end(outcome.gathered, outcome.records)
-
-
-def _refuse_run(argument: str, value: object) -> None:
-    """Refuse what only a run in time has."""
-    if value is not None:
-        remedy = "Leave it out: the answer is that of the stationary motion, without a run."
-        _checks.refuse(argument, "not be given on a white road", value, remedy)
 
 
 def _stationary(vehicle: AbstractVehicle, chosen: Sequence[Metric], *, all_of_them: bool) -> tuple[Metric, ...]:

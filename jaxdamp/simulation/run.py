@@ -12,13 +12,14 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_field_types, check_module
+from jaxdamp._forked import refuse_fork
 from jaxdamp._traced import at_compile_time, behind, is_traced
-from jaxdamp._types import Scalar, Signal
+from jaxdamp._types import Scalar, ScalarLike, Signal
 from jaxdamp.dampers import coverage, warn_outside
 from jaxdamp.parameters import modules_inside
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation.adaptive import Adaptive
-from jaxdamp.simulation.engine import AbstractEngine, RunState, check_control, chosen_engine
+from jaxdamp.simulation.engine import AbstractEngine, RunState, check_control, check_demands, chosen_engine
 from jaxdamp.simulation.equations import Equations, RoadEdges
 from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.notes import range_sentences
@@ -131,6 +132,7 @@ def simulate(
     >>> round(float(response.metrics()["working_space_peak_to_peak"]), 3)
     0.072
     """
+    refuse_fork()
     check_module("vehicle", vehicle, (AbstractVehicle,), "simulate(vehicle, road)")
     check_module("road", road, (AbstractRoad,), "simulate(vehicle, road)")
     refuse_stacked(vehicle)
@@ -141,21 +143,23 @@ def simulate(
         substeps = None
     engine, dt = chosen_engine(engine, Exponential(substeps=substeps), dt, substeps)
     system = vehicle.system()
-    check_control(engine, system, dt)
     if state is not None:
         _check_state(state, start, engine, system)
     begins = None if state is None else state.time
     time, heights = sampled(vehicle, road, duration, dt, begins)
+    goes_on = (state is not None, return_state)
+    check_control(engine, system, dt, (time.size - 1) * dt, part=any(goes_on))
     _strides(time.size - 1, every, dt)
     begin = None if start is None else _displaced(vehicle, heights[0], start)
     engine = engine.prepared(run_check(vehicle, system, road, heights, dt, begin, begins))
-    edges = _edges(vehicle, road, time, heights, (state is not None, return_state))
+    edges = _edges(vehicle, road, time, heights, goes_on)
     with engine.naming_derivatives():
         step = jnp.asarray(dt, dtype=float)
         saved, status = recorded(engine, system, heights, step, begin if state is None else state, every, edges)
-    first, last = behind(saved.motion[0]), behind(saved.motion[-1])
-    if first is not None and last is not None and not np.all(np.isfinite(last)):
-        if not np.all(np.isfinite(first)):
+    check_demands(system, time[::every], saved.motion, saved.commands)
+    motion = behind(saved.motion)
+    if motion is not None and not np.all(np.isfinite(last := motion[..., -1, :])):
+        if not np.all(np.isfinite(motion[..., 0, :])):
             refuse_restless(vehicle)
         remedy = " ".join([*filter(None, map(coverage, system.laws)), engine.remedy(status, dt)])
         _checks.refuse("vehicle", "have a finite response", f"at {last} (position, rate) at the end", remedy)
@@ -278,12 +282,13 @@ def sampled(
     if event is not None and event < 2 * dt * (1 - 1e-9):
         must = f"be at most half the time over the shortest bump, {event:.3g} s, which steps would skip"
         _checks.refuse("dt", must, f"{dt:g} s", f"Pass `dt={rounded_down(event / 8):g}`, or make the bump longer.")
-    time = _instants(duration, dt, begins)
+    time = _instants(round(duration / dt), dt, begins)
     return time, heights_under_wheels(vehicle, road, time)
 
 
-def _instants(duration: float, dt: float, begins: Scalar | None) -> Signal:
-    time = jnp.arange(round(duration / dt) + 1, dtype=float)
+@jax.jit(static_argnames="count")
+def _instants(count: int, dt: ScalarLike, begins: Scalar | None) -> Signal:
+    time = jnp.arange(count + 1, dtype=float)
     if begins is not None:  # a whole number of steps, so that instants are those of the whole run to the last bit
         steps = begins / dt
         time = time + jnp.where(jnp.abs(steps - jnp.round(steps)) < 1e-6, jnp.round(steps), steps)

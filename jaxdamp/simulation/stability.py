@@ -39,19 +39,12 @@ class Need(NamedTuple):
 
 
 class Slopes(NamedTuple):
-    """The largest slopes of a law.
+    """The largest slopes of a law."""
 
-    Arguments:
-        damping: of the force by the velocity at the end of a step [N s/m].
-        stiffness: of the force by the travel within a step, through the stroke and the states [N/m].
-        at_rest: of the force by the stroke at rest [N/m], the states held.
-        rate: of states that an explicit step carries on [1/s].
-    """
-
-    damping: float = 0.0
-    stiffness: float = 0.0
-    at_rest: float = 0.0
-    rate: float = 0.0
+    damping: float = 0.0  # of the force by the velocity at the end of a step [N s/m]
+    stiffness: float = 0.0  # of the force by the travel within a step, through the stroke and the states [N/m]
+    at_rest: float = 0.0  # of the force by the stroke at rest [N/m], the states held
+    rate: float = 0.0  # of states that an explicit step carries on [1/s]
 
 
 class _Samples(NamedTuple):
@@ -216,11 +209,11 @@ def _at_largest_ratio(law: AbstractDamper) -> AbstractDamper:
 
 
 def _of_term(law: AbstractDamper, dt: float) -> _Samples:
-    velocity, size, traits = jnp.asarray(_VELOCITIES), law.initial_state().size, law.traits()
+    velocity, size, traits = jnp.asarray(_VELOCITIES, float), law.initial_state().size, law.traits()
     rates = _slopes_of_rates(law, velocity) if size and traits.has_explicit_step else None
     if size and traits.extrapolable_states:
         return _Samples(_slopes_over_step(law, velocity, jnp.asarray(dt, dtype=float)), rates=rates)
-    return _Samples(None, *_slopes_at_instant(law, velocity, jnp.asarray(_STROKES)), rates)
+    return _Samples(None, *_slopes_at_instant(law, velocity, jnp.asarray(_STROKES, float)), rates)
 
 
 def _largest(values: Array | np.ndarray) -> float:

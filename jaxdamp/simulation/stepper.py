@@ -4,12 +4,12 @@ from abc import abstractmethod
 from typing import cast, final
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar, ScalarLike
-from jaxdamp.control import Commands, ControlLoop, Flags, Sampler, Signals
+from jaxdamp.control import Commands, ControlLoop, Flags, Sampler, Signals, where
+from jaxdamp.parameters import as_float
 from jaxdamp.simulation.equations import Equations, RoadInput, StepState
 
 
@@ -66,7 +66,7 @@ class AbstractStepper(eqx.Module):
 
 
 @final
-class Controller:
+class Controller(eqx.Module):
     """What a controller does at the instants of a run.
 
     Arguments:
@@ -74,40 +74,54 @@ class Controller:
         spacing: of the instants [s].
     """
 
+    stepper: AbstractStepper
+    spacing: Scalar
+    sampler: Sampler
+
     def __init__(self, stepper: AbstractStepper, spacing: ScalarLike) -> None:
+        self.stepper, self.spacing = stepper, as_float(spacing)
         equations = stepper.equations
-        self._stepper, self._loop = stepper, cast(ControlLoop, equations.system.control)
-        self._spacing = jnp.asarray(spacing, dtype=float)
-        self._sampler = Sampler(self._loop, equations.system.laws, equations.layout, self._spacing)
+        loop = cast(ControlLoop, equations.system.control)
+        self.sampler = Sampler(loop, equations.system.laws, equations.layout, self.spacing)
+
+    @property
+    def loop(self) -> ControlLoop:
+        """The controller as it is assembled."""
+        return cast(ControlLoop, self.stepper.equations.system.control)
 
     def begin(self, now: StepState, road: RoadInput) -> StepState:
         """The vehicle at the first instant, before the first sample."""
-        return now._replace(control=self._sampler.begin(self._signals(now, road)))
+        return now._replace(control=self.sampler.begin(self._signals(now, road)))
 
     def flags(self, count: int, begins: ScalarLike) -> Flags:
         """What happens at so many instants, the first of them at a time [s]."""
-        return self._loop.flags(count, self._spacing, jnp.round(begins / self._spacing))
+        return self.loop.flags(count, self.spacing, jnp.round(begins / self.spacing))
 
     def decided(self, now: StepState, road: RoadInput, flags: Flags) -> StepState:
         """After an instant: sensed and decided; where commands are applied, with the forces under them."""
-        states = self._stepper.equations.ports.by_port(now.states)
+        states = self.stepper.equations.ports.by_port(now.states)
         assert now.control is not None
-        control = self._sampler.sampled(now.control, self._signals(now, road), states, flags)
-        commands, rises = self._loop.resumed(control, self._stepper.dt)
-        after = self._stepper.recommanded(now, road, commands, rises)
-        chosen = jax.tree.map(
-            lambda new, old: jnp.where(flags.apply > 0.0, new, old), after, now._replace(control=None)
-        )
+        control = self.sampler.sampled(now.control, self._signals(now, road), states, flags)
+
+        def commanded() -> StepState:
+            commands, rises = self.loop.resumed(control, self.stepper.dt)
+            return self.stepper.recommanded(now, road, commands, rises)._replace(control=None)
+
+        chosen = where(flags.apply > 0.0, commanded, now._replace(control=None))
         return chosen._replace(control=control)
 
     def _signals(self, now: StepState, road: RoadInput) -> tuple[Signals, ...]:
-        at_ports = self._stepper.equations.at_ports(now.motion, road)
-        return self._sampler.signals(now.motion, now.force, road, at_ports)
+        at_ports = self.stepper.equations.at_ports(now.motion, road)
+        return self.sampler.signals(now.motion, now.force, road, at_ports)
 
 
 @final
 class ControlledStepper(AbstractStepper):
-    """Steps of an engine with the commands that a vehicle has at their ends."""
+    """Steps of an engine with the commands that a vehicle has at their ends.
+
+    Arguments:
+        inner: of the engine, with its step `dt` [s].
+    """
 
     equations: Equations
     dt: Scalar

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Literal, final
 
 import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PyTree
 
@@ -98,7 +99,9 @@ def heights_under_wheels(vehicle: AbstractVehicle, road: AbstractRoad, time: Sig
     side = np.array([np.sum(axles[:i] == axle) for i, axle in enumerate(axles)])
     first = axles * columns.tracks if columns.kind == "delayed" else np.zeros_like(axles)
     chosen = first + (side if columns.tracks > 1 else 0)
-    return heights if np.array_equal(chosen, np.arange(heights.shape[1])) else heights[:, chosen]
+    if np.array_equal(chosen, np.arange(heights.shape[1])):
+        return heights
+    return jnp.take(heights, chosen, axis=1, mode="clip")
 
 
 def moves_axles(build: Callable[[PyTree], AbstractVehicle], values: PyTree) -> bool:

@@ -4,10 +4,14 @@
 - `SequentialQuadratic`: constrained minimisation of one or several objectives, many searches side by side.
 """
 
-from jaxdamp.solve.constrained import Evaluation, Region, Scaling, SearchState, SequentialQuadratic
+from jaxdamp.solve.constrained import Evaluation, Region, Scaling, SearchState as SearchState, SequentialQuadratic
 from jaxdamp.solve.damped_steps import Linearisation
-from jaxdamp.solve.least_squares import BoundedLevenbergMarquardt, ImplicitWithinBounds
-from jaxdamp.solve.on_host import SearchLanes, least_squares_on_host
+from jaxdamp.solve.least_squares import (
+    BoundedLevenbergMarquardt,
+    ImplicitWithinBounds,
+    SearchLanes as SearchLanes,
+    least_squares_on_host,
+)
 
 
 __all__ = [
@@ -17,8 +21,6 @@ __all__ = [
     "Linearisation",
     "Region",
     "Scaling",
-    "SearchLanes",
-    "SearchState",
     "SequentialQuadratic",
     "least_squares_on_host",
 ]

@@ -68,7 +68,8 @@ class SweepResults:
         """A row for each point: its axes, the results that are one number, and why it failed, where one did."""
         data = self._data
         dims = data["failed"].dims
-        axes = [name for name, axis in data.coords.items() if name not in ("failed", "reason") and _is_in(axis, dims)]
+        of_points = [name for name, axis in data.coords.items() if axis.dims and set(axis.dims) <= set(dims)]
+        axes = [name for name in of_points if name not in ("failed", "reason")]
         results = [name for name, result in data.data_vars.items() if result.dims == dims]
         names = [*axes, *results]
         columns = [Column(str(name), typeset_unit(data[name].attrs.get("units", ""))) for name in names]
@@ -88,11 +89,6 @@ class SweepResults:
         from jaxdamp.plots import sweep
 
         return sweep(self._data, metric, over)
-
-
-def _is_in(axis: xarray.DataArray, dims: tuple[object, ...]) -> bool:
-    """Whether a coordinate belongs to the points, not to an axis of a result."""
-    return bool(axis.dims) and set(axis.dims) <= set(dims)
 
 
 def _cell(value: object) -> object:

@@ -47,10 +47,9 @@ class AbstractPoints(ABC):
         """The labels of the results, as xarray takes them."""
 
 
-@final
 @dataclasses.dataclass(frozen=True)
-class Grid(AbstractPoints):
-    """Every combination of the values of the axes; the last axis runs fastest."""
+class AbstractListed(AbstractPoints):
+    """Points from given values of the axes."""
 
     values: Columns
 
@@ -58,6 +57,12 @@ class Grid(AbstractPoints):
     def names(self) -> list[str]:
         """Names of the axes."""
         return list(self.values)
+
+
+@final
+@dataclasses.dataclass(frozen=True)
+class Grid(AbstractListed):
+    """Every combination of the values of the axes; the last axis runs fastest."""
 
     @property
     def shape(self) -> dict[str, int]:
@@ -77,15 +82,8 @@ class Grid(AbstractPoints):
 
 @final
 @dataclasses.dataclass(frozen=True)
-class Points(AbstractPoints):
+class Points(AbstractListed):
     """Points one by one, along the dimension `point`."""
-
-    values: Columns
-
-    @property
-    def names(self) -> list[str]:
-        """Names of the axes."""
-        return list(self.values)
 
     @property
     def shape(self) -> dict[str, int]:

@@ -5,7 +5,6 @@ import hashlib
 import time
 import warnings
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import final
 
 import jax
@@ -181,11 +180,6 @@ def sweep_into_store(
             stacklevel=3,
         )
     return data
-
-
-def is_store(file: object) -> bool:
-    """Whether results go to a Zarr store instead of a netCDF file."""
-    return file is not None and Path(str(file)).suffix == ".zarr"
 
 
 def _digest(points: AbstractPoints) -> str:

@@ -49,7 +49,7 @@ def check_refusals(law: AbstractDamper) -> None:
             require_refusal(call, ("`state`", "'state'"), REFUSALS, message)
 
 
-def check_parameters(law: AbstractDamper) -> None:
+def check_parameters(law: eqx.Module) -> None:
     """Each parameter has a unit that can be read, a meaning and a domain that is enforced."""
     import pint
 
@@ -82,7 +82,7 @@ def check_text(law: AbstractDamper) -> None:
         require(shown in text, f"`{p.path}` must be printed as {shown}, but the law prints as {text}")
 
 
-def check_file(law: AbstractDamper) -> None:
+def check_file(law: eqx.Module) -> None:
     """Written as JSON and read again, the law is exactly the same."""
     text = to_json(law)
     again = from_json(text)

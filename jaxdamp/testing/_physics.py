@@ -126,9 +126,9 @@ def check_batched(law: AbstractDamper) -> None:
     free, (dt, x, v) = free_parameters(law), motion()
     values = np.asarray(free.values) * np.array([1.0, 1.03, 0.96])[:, None]
     force, _ = responses(free, values, dt, x, v)
-    signals = (jnp.asarray(dt), jnp.asarray(x), jnp.asarray(v), jnp.ones(SAMPLES))
+    signals = (jnp.asarray(dt), jnp.asarray(x, float), jnp.asarray(v, float), jnp.ones(SAMPLES))
     for row, expected in zip(values, force, strict=True):
-        single, _ = response_and_gradient(free, jnp.asarray(row), *signals)
+        single, _ = response_and_gradient(free, jnp.asarray(row, float), *signals)
         atol = 1e-9 * np.max(np.abs(expected))
         require_equal(single, expected, "A batch of laws must respond as each alone.", rtol=1e-9, atol=atol)
 
@@ -138,7 +138,7 @@ def check_derivatives(law: AbstractDamper) -> None:
     free, (dt, x, v) = free_parameters(law), motion()
     values, weights = np.asarray(free.values), np.cos(np.arange(SAMPLES))
     force, jacobian = (a[0] for a in responses(free, values, dt, x, v))
-    signals = (jnp.asarray(dt), jnp.asarray(x), jnp.asarray(v), jnp.asarray(weights))
+    signals = (jnp.asarray(dt), *(jnp.asarray(a, float) for a in (x, v, weights)))
     _, reverse = response_and_gradient(free, free.values, *signals)
     size = np.max(np.abs(force))
     effect = np.maximum(np.max(np.abs(jacobian), axis=0), 1e-300)

@@ -37,16 +37,6 @@ class Descent:
     def __init__(self, evaluator: Evaluator, max_steps: int, progress: Callable[[int, float], None]) -> None:
         self.task, self._evaluator, self._max_steps, self._progress = evaluator.task, evaluator, max_steps, progress
 
-    def search(
-        self, starts: Sequence[np.ndarray] | np.ndarray, evaluations: Sequence[Evaluation], limits: Sequence[Limit]
-    ) -> list[Ended]:
-        """One search from each start.
-
-        If one ends before an optimum, its estimate of the curvature is wrong or a kink has stopped it: it is started
-        again.
-        """
-        return self._search(starts, evaluations, limits, None)
-
     def choose(self, ended: Ended, limits: Sequence[Limit]) -> list[Ended]:
         """Searches with each combination of the choices next to where a search ended, over what else is free."""
         space = self.task.space
@@ -54,19 +44,24 @@ class Descent:
         sides = [[value] if choice is None else choice.around(value) for choice, value in pairs]
         combinations = np.array(list(itertools.product(*sides)))
         starts = combinations / space.unit
-        several = self._search(starts, self._evaluator.at(starts), limits, space.is_choice)
+        several = self.search(starts, self._evaluator.at(starts), limits, space.is_choice)
         return [
             one._replace(values=np.where(space.is_choice, exact, one.values))
             for exact, one in zip(combinations, several, strict=True)
         ]
 
-    def _search(
+    def search(
         self,
         starts: Sequence[np.ndarray] | np.ndarray,
         evaluations: Sequence[Evaluation],
         limits: Sequence[Limit],
-        fixed: np.ndarray | None,
+        fixed: np.ndarray | None = None,
     ) -> list[Ended]:
+        """One search from each start, some coordinates being fixed.
+
+        If one ends before an optimum, its estimate of the curvature is wrong or a kink has stopped it: it is started
+        again.
+        """
         solver = self._solver(abs(float(evaluations[0].rows[0])) or 1.0, limit_ends(limits))
         aim = np.zeros(1)
         states = [solver.init(aim, y, now) for y, now in zip(starts, evaluations, strict=True)]

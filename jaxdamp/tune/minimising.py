@@ -15,6 +15,7 @@ from jaxdamp.tune.descending import Descent, Ended, missed, reached
 from jaxdamp.tune.limits import Limit
 from jaxdamp.tune.objective import Function, check_objective
 from jaxdamp.tune.ranges import start_points
+from jaxdamp.tune.relaxing import relaxation
 from jaxdamp.tune.rescoring import on_fresh_roads
 from jaxdamp.tune.result import Attempt, Drive, ScenarioValues, TuneResult, V
 from jaxdamp.tune.scenario_ride import ScenarioRide, exact
@@ -229,6 +230,7 @@ def _result(
         extrapolated=tuple(extrapolated),
         allowed=task.allowed,
         elsewhere=_where(task, fresh_roads),
+        relaxation=relaxation(task, ended, limits),
     )
 
 

@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._pieces import piece
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Compared, Table, comparison_table, plain
 from jaxdamp._types import Scalar
@@ -111,6 +112,22 @@ class Rescore(AbstractResult):
     def half_width(self, name: str) -> float:
         """Half the 95 % interval of the mean relative change of a metric; infinite for one road."""
         return half_interval(self.change(name))
+
+    def percentile(self, name: str, percent: float) -> tuple[float, float]:
+        """The value of a metric that it does not exceed on this share of the roads, before and after.
+
+        Arguments:
+            name: of the metric.
+            percent: of the roads, 0 to 100; between roads the values are interpolated.
+
+        Raises:
+            ValueError: an unknown metric; a share outside 0 to 100.
+        """
+        _checks.one_of("name", name, self.before)
+        if not 0.0 <= percent <= 100.0:
+            _checks.refuse("percent", "lie between 0 and 100", percent)
+        before, after = (float(np.percentile(side[name], percent)) for side in (self.before, self.after))
+        return before, after
 
     @property
     def summary(self) -> str:
@@ -237,7 +254,9 @@ def on_fresh_roads(
         part = others[first:last]
         if not part:
             break
-        new = rescored(cars, part, objective.metrics, objective, units, objective.name, run)
+        inputs = ("fresh roads", cars, part, objective.name, units, run)
+        what = (cars, part, objective.metrics, objective, units, objective.name, run)
+        new = piece(inputs, lambda what=what: rescored(*what))
         driven = new if driven is None else driven.and_on(new)
         if decided(driven, allowed):
             break

@@ -10,9 +10,10 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp._display import display
 from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
-from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, with_unit
+from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, typeset_unit, with_unit
 from jaxdamp._types import Figure
 from jaxdamp.tune.limits import LimitRange, written
 from jaxdamp.tune.objective import Objective, Targets
@@ -96,6 +97,8 @@ class TuneResult(AbstractResult, Generic[V]):
         allowed: the limits as they are written, which may be relative to the start on each road.
         elsewhere: where the numbers hold if there are no fresh roads, in words.
         tolerances: the effect of the scatter of each parameter on the metric, at the tuned vehicle, of `robust`.
+        relaxation: which limit, relaxed by how much, would make the metric 1 % smaller, on the road of the tuning and
+            to first order; where limits are not met, those that the search could have met. In words, empty without.
     """
 
     vehicle: V
@@ -122,6 +125,7 @@ class TuneResult(AbstractResult, Generic[V]):
     allowed: dict[str, LimitRange] = dataclasses.field(default_factory=dict)
     elsewhere: str = ""
     tolerances: tuple[ToleranceEffect, ...] = ()
+    relaxation: str = ""
 
     @property
     def verdict(self) -> Verdict:
@@ -141,7 +145,12 @@ class TuneResult(AbstractResult, Generic[V]):
 
     @property
     def summary(self) -> str:
-        """The verdict, the change on the road of the tuning, active bounds and limits, and the extreme scenarios."""
+        """The verdict, and `ending`."""
+        return f"{self.verdict.sentence} {self.ending}"
+
+    @property
+    def ending(self) -> str:
+        """The change on the road of the tuning, bounds and limits with their price, and extreme scenarios, in words."""
         before, after, unit = self.before[self.metric], self.after[self.metric], self.units[self.metric]
         share = f" ({100 * (after / before - 1):+.1f} %)" if before else ""
         stops = [f"{name} at its limit" for name in self.active_limits]
@@ -153,8 +162,8 @@ class TuneResult(AbstractResult, Generic[V]):
         state = "an optimum" if self.converged else "not an optimum"
         stops += [f"no effect of {name}" for name in self.without_effect]
         parts = [f"{state} after {len(self.history)} steps", *stops, *[inside] * bool(inside)]
-        text = f"{self.verdict.sentence} {self.metric} {before:.4g} -> {after:.4g} {unit}{share}: {', '.join(parts)}."
-        return f"{text}{self._extremes}"
+        text = f"{self.metric} {before:.4g} -> {after:.4g} {unit}{share}: {', '.join(parts)}."
+        return " ".join(filter(None, (f"{text}{self._extremes}", self.relaxation)))
 
     @property
     def _extremes(self) -> str:
@@ -196,7 +205,8 @@ class TuneResult(AbstractResult, Generic[V]):
         if name not in self.limits:
             return target
         span = self.limits[name]
-        text = written(span if isinstance(span, tuple) else (-math.inf, span))
+        shown, (lower, upper) = display().of(self.units[name]), span if isinstance(span, tuple) else (-math.inf, span)
+        text = f"{written((shown(lower), shown(upper)))} {typeset_unit(shown.unit)}".rstrip()
         mark = ", violated" if name in self.violated else ", reached" * (name in self.active_limits)
         return "; ".join(filter(None, (f"{text}{mark}", target)))
 
@@ -268,7 +278,7 @@ class TuneResult(AbstractResult, Generic[V]):
     def content(self) -> dict[str, Any]:
         """The tuning as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         sides = {"before": self.before, "after": self.after}
-        words = ("metric", "violated", "active", "active_limits", "without_effect")
+        words = ("metric", "violated", "active", "active_limits", "relaxation", "without_effect")
         return self._data(*words, "parameters", "scenarios", "starts", "tolerances", "history") | {
             "verdict": self.verdict.outcome.name,
             "metrics": {

@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._pieces import piece
 from jaxdamp.dampers import has_fitted_range
 from jaxdamp.metrics import Metric, current_name
 from jaxdamp.roads import AbstractRoad, WhiteRoad
@@ -203,6 +204,7 @@ class Evaluator:
 
     def __init__(self, task: DesignTask[Any], lanes: int) -> None:
         self.task, self.program = task, BatchProgram(task.measured, task.space.free, lanes)
+        self._inputs = ("metrics and slopes", task.vehicle, task.road, task.run, task.objective.name, task.names, lanes)
         self._signed = [(name, 1.0) for name in task.objective.names]
 
     def at(self, points: Float[np.ndarray, "points free"]) -> list[Evaluation]:
@@ -212,7 +214,8 @@ class Evaluator:
     def computed(self, points: Float[np.ndarray, "points free"]) -> Computed:
         """Numbers, and derivatives by the coordinates."""
         space = self.task.space
-        values, slopes = self.program.at(np.clip(points * space.unit, space.lower, space.upper))
+        at = np.clip(points * space.unit, space.lower, space.upper)
+        values, slopes = piece((*self._inputs, space.free.names, at), lambda: self.program.at(at))
         return Computed(values, slopes * space.unit)
 
     def rows_of(self, computed: Computed) -> list[Evaluation]:

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, with_unit
-from jaxdamp.dampers import MonoTube
+from jaxdamp.dampers import MonoTube, TwinTube
 
 
 class ValveParameter(NamedTuple):
@@ -50,7 +50,7 @@ class OutOfReach(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class ValvingResult(AbstractResult):
-    """A mono-tube damper whose valving was chosen for a wanted force.
+    """A mono-tube or twin-tube damper whose valving was chosen for a wanted force.
 
     Attributes:
         law: the damper: the nearest one within the bounds.
@@ -68,8 +68,8 @@ class ValvingResult(AbstractResult):
         status: how the search ended.
     """
 
-    law: MonoTube
-    start: MonoTube
+    law: MonoTube | TwinTube
+    start: MonoTube | TwinTube
     parameters: tuple[ValveParameter, ...]
     velocity: Float[np.ndarray, " samples"]
     target_force: Float[np.ndarray, " samples"]

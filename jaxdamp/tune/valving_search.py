@@ -1,4 +1,4 @@
-"""`valving`: the bleed, valves and gas pressure of a mono-tube damper that give a wanted force."""
+"""`valving`: the bleed, valves and gas pressure of a mono-tube or twin-tube damper that give a wanted force."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -18,7 +18,7 @@ from jaxdamp._status import Status
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._triangles import triangle
 from jaxdamp.bench import BenchRun, as_runs
-from jaxdamp.dampers import AbstractDamper, MonoTube
+from jaxdamp.dampers import AbstractDamper, MonoTube, TwinTube
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.rig import march, quasi_static, respond
 from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, least_squares_on_host
@@ -45,7 +45,7 @@ class ValvingSettings(Free, total=False):
     max_steps: int
 
 
-DEFAULTS = {"over": ("piston.*", "gas.pressure"), "freeze": (), "bounds": None, "starts": 8, "max_steps": 200}
+DEFAULTS = {"over": None, "freeze": (), "bounds": None, "starts": 8, "max_steps": 200}
 ForceOf = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]  # of values: all forces, and their derivatives
 
 
@@ -88,7 +88,7 @@ class _End(NamedTuple):
 @of_known_numbers
 def valving(
     target: AbstractDamper | BenchRun | Sequence[BenchRun] | tuple[Any, Any],
-    start: MonoTube,
+    start: MonoTube | TwinTube,
     *,
     velocities: Any = None,
     motions: Sequence[tuple[float, float]] = (),
@@ -96,7 +96,7 @@ def valving(
     substeps: int = 1,
     **settings: Unpack[ValvingSettings],
 ) -> ValvingResult:
-    """Find the valving of a mono-tube damper that gives a wanted force, or the nearest one within its bounds.
+    """Find the valving of a tube that gives a wanted force, or the nearest one within its bounds.
 
     Least squares of the force with exact derivatives by `jaxdamp.solve.BoundedLevenbergMarquardt`, from several starts.
     If the remaining error is above the tolerance, the result says in which range of velocity, by how much, and which
@@ -114,7 +114,7 @@ def valving(
         motions: of a law also loops of sinusoidal motion, `[(frequency [Hz], amplitude [m]), ...]`, for its hysteresis.
         tolerance: largest error of a feasible valving: RMS over RMS of the wanted force.
         substeps: steps between two samples of a record, as in `respond`.
-        settings: keywords, all optional: `over`, the parameters to choose, all of the piston and the gas pressure if
+        settings: keywords, all optional: `over`, the parameters to choose, all of the valves and the gas pressure if
             left out, `freeze` and `bounds`, as in `minimise`; `starts`, the number of starts, 8 if left out;
             `max_steps`, the largest number of steps from each, 200 if left out.
 
@@ -130,15 +130,17 @@ def valving(
     >>> result.feasible, result.rmse < 1.0
     (True, True)
     """
-    check_module("start", start, (MonoTube,), "valving(target, start)")
+    check_module("start", start, (MonoTube, TwinTube), "valving(target, start)")
     asked = completed("valving", settings, DEFAULTS)
+    valves = ["piston.*", *["base.*"] * isinstance(start, TwinTube)]
+    over = [*valves, "gas.pressure"] if asked["over"] is None else asked["over"]
     _checks.positive("tolerance", tolerance)
     _checks.counts(starts=asked["starts"], substeps=substeps, max_steps=asked["max_steps"])
     wanted = _wanted(target, start, velocities, motions)
     size = float(np.sqrt(np.mean(wanted.all_forces**2)))
     if not size > 0.0:
         _checks.refuse("target", "have a force", "zero everywhere")
-    space = search_range(start, asked["over"], asked["freeze"], asked["bounds"])
+    space = search_range(start, over, asked["freeze"], asked["bounds"])
     charge = np.array([name == "gas.pressure" for name in space.free.names])  # which must stay above that of a cavity
     cavity = (1.0 + INSIDE) * float(start.cavitation_pressure)
     space = dataclasses.replace(space, lower=np.where(charge, np.maximum(space.lower, cavity), space.lower))
@@ -187,7 +189,7 @@ def _best(
     return best
 
 
-def _wanted(target: Any, start: MonoTube, velocities: Any, motions: Sequence[tuple[float, float]]) -> Wanted:
+def _wanted(target: Any, start: MonoTube | TwinTube, velocities: Any, motions: Sequence[tuple[float, float]]) -> Wanted:
     """The target as points and loops."""
     if isinstance(target, AbstractDamper):
         points = np.asarray(VELOCITIES if velocities is None else velocities, float)
@@ -217,7 +219,7 @@ def _points(target: tuple[Any, ...]) -> Wanted:
     return Wanted(points, curve, ())
 
 
-def _loop(target: AbstractDamper, start: MonoTube, frequency: float, amplitude: float) -> Loop:
+def _loop(target: AbstractDamper, start: MonoTube | TwinTube, frequency: float, amplitude: float) -> Loop:
     """Two cycles of a sine, the second of which is compared."""
     _checks.positive("motions", np.array([frequency, amplitude]))
     steps = max(CYCLE, int(np.ceil(1.0 / (frequency * LONGEST_STEP))))
@@ -250,7 +252,7 @@ def _forces(free: FreeParameters, wanted: Wanted, substeps: int) -> ForceOf:
     return evaluate
 
 
-def _marched(law: MonoTube, loop: Loop, substeps: int) -> Array:
+def _marched(law: MonoTube | TwinTube, loop: Loop, substeps: int) -> Array:
     """The force of a law at the compared samples of a motion."""
     dt, stroke, velocity = (jnp.asarray(values) for values in (loop.dt, loop.stroke, loop.velocity))
     return march(law, dt, stroke, velocity, substeps)[loop.first :]

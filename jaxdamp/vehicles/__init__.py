@@ -13,12 +13,8 @@ from jaxdamp._guesses import answer_guesses
 from jaxdamp.vehicles import presets
 from jaxdamp.vehicles.base import AbstractVehicle, LumpedVehicle, refuse_controller as refuse_controller
 from jaxdamp.vehicles.cars import FullCar, HalfCar, QuarterCar, RollCar
-from jaxdamp.vehicles.channels import (
-    GOALS as GOALS,
-    Channel as Channel,
-    ChannelKind as ChannelKind,
-    is_stationary as is_stationary,
-)
+from jaxdamp.vehicles.channels import Channel as Channel, ChannelKind as ChannelKind
+from jaxdamp.vehicles.chosen_metrics import GOALS as GOALS, is_stationary as is_stationary
 from jaxdamp.vehicles.corner import Axle, Corner
 from jaxdamp.vehicles.equilibrium import (
     refuse_restless as refuse_restless,
@@ -27,7 +23,7 @@ from jaxdamp.vehicles.equilibrium import (
 )
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.frequency_response import frequency_response, spectral_rms
-from jaxdamp.vehicles.guided import ForceDriven, Guide, Guided
+from jaxdamp.vehicles.guided import ForceDriven as ForceDriven, Guide, Guided
 from jaxdamp.vehicles.linear import (
     LinearVehicle as LinearVehicle,
     delays_of as delays_of,
@@ -35,7 +31,16 @@ from jaxdamp.vehicles.linear import (
     with_weightings as with_weightings,
 )
 from jaxdamp.vehicles.modes import Modes as Modes, Oscillations as Oscillations, modes, oscillations
-from jaxdamp.vehicles.parts import Body, Element as Element, Link, Place, Point as Point, Wheel, prefixed as prefixed
+from jaxdamp.vehicles.parts import (
+    Body,
+    Element as Element,
+    Link,
+    Place,
+    Point as Point,
+    Wheel,
+    matrix as matrix,
+    prefixed as prefixed,
+)
 from jaxdamp.vehicles.port_form import (
     Earlier as Earlier,
     LinearMap as LinearMap,
@@ -58,7 +63,6 @@ __all__ = [
     "Cab",
     "Corner",
     "CubicSpring",
-    "ForceDriven",
     "Frame",
     "FullCar",
     "Guide",

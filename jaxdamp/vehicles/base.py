@@ -14,25 +14,20 @@ from jaxdamp import _checks
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.metrics import Metric, current_name
-from jaxdamp.parameters import Module, check_parameters, readable
-from jaxdamp.vehicles.channels import GOALS, channels_of, chosen_metrics, metrics_of_goal
+from jaxdamp.parameters import AbstractDeclared
+from jaxdamp.vehicles.channels import channels_of
+from jaxdamp.vehicles.chosen_metrics import GOALS, chosen_metrics, metrics_of_goal
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.port_form import PortForm
 from jaxdamp.vehicles.system import Layout, System, assemble, layout_of
 
 
-class AbstractVehicle(Module):
+class AbstractVehicle(AbstractDeclared):
     """Masses and springs with damper laws at ports.
 
     A vehicle declares its parameters and has one method, `frame`, which returns its parts; the `layout` and the
     assembled `system` follow from it. `docs/vehicles.md` shows an example.
     """
-
-    def __check_init__(self) -> None:
-        check_parameters(self)
-
-    def __repr__(self) -> str:
-        return readable(self)
 
     @abstractmethod
     def frame(self) -> Frame:

@@ -1,12 +1,10 @@
 """The channels of a vehicle and the predefined ride metrics of them."""
 
 import enum
-import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
-from jaxdamp import _checks
-from jaxdamp.metrics import Metric, current_names
+from jaxdamp.metrics import Metric
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.parts import Body, Element, Link, Point, Wheel, prefixed
 
@@ -22,6 +20,8 @@ class ChannelKind(enum.Enum):
 
     HEIGHT = "height of a body or a place", "m"
     ANGLE = "pitch or roll angle of a body", "rad"
+    VELOCITY = "vertical velocity of a body or a place", "m/s"
+    ANGULAR_VELOCITY = "pitch or roll velocity of a body", "rad/s"
     ACCELERATION = "vertical acceleration of a body or a place", "m/s^2", "Wk"
     ANGULAR_ACCELERATION = "pitch or roll acceleration of a body", "rad/s^2", "We"
     STROKE = "deflection between two points, extension positive", "m"
@@ -83,7 +83,7 @@ def channels_of(frame: Frame) -> list[Measured]:
         channels += _of_elements(part)
     for wheel in frame.wheels:
         channels += _of_wheel(wheel)
-    return channels
+    return [*channels, *_velocities(frame)]  # last, so that numbers of outputs in exported programs stay
 
 
 def _signal(what: str, point: Point) -> Point:
@@ -113,6 +113,30 @@ def _of_body(body: Body) -> list[Measured]:
         angle, of = body.angle(turn.axis), f"of {body.name}, {turn.sense}"
         words, kinds = (f"{turn.axis} angle {of}", f"{turn.axis} acceleration {of}"), ANGULAR
         channels += _of_point(body.name, Point({angle: 1.0}), (angle, angle), words, kinds)
+    return channels
+
+
+def _velocities(frame: Frame) -> list[Measured]:
+    """Of bodies, their angles and places, and of turning bodies above each link and wheel with laws."""
+
+    def rate(name: str, place: str, of: str, point: Point, kind: ChannelKind = ChannelKind.VELOCITY) -> Measured:
+        return Channel(f"{name}_velocity", kind, place, f"velocity of {of}"), _signal("rate", point)
+
+    channels = []
+    for body in frame.bodies:
+        channels.append(rate(body.name, body.name, f"{body.name}, up", body.at()))
+        for turn in body.turns:
+            angle, of = body.angle(turn.axis), f"{turn.axis} of {body.name}, {turn.sense}"
+            channels.append(rate(angle, body.name, of, Point({angle: 1.0}), ChannelKind.ANGULAR_VELOCITY))
+    for place in frame.places:
+        channels.append(rate(place.name, place.name, f"{place.name} on {place.body}, up", frame.place(place)))
+    above = [(link.name, link.extension) for link in frame.links if link.elements]
+    for name, point in [*above, *((wheel.name, wheel.point) for wheel in frame.wheels if wheel.elements)]:
+        for body in frame.bodies:
+            terms = {q: point.terms[q] for q in body.masses if q in point.terms}
+            if len(terms) > 1 and terms.get(f"z_{body.name}") == 1.0:
+                of = f"{body.name} above {name}, up"
+                channels.append(rate(prefixed(name, "body"), name, of, Point(terms)))
     return channels
 
 
@@ -167,14 +191,6 @@ def _share(element: Element, part: Link | Wheel) -> str:
 
 def _together(part: Link | Wheel) -> str:
     return f", {'both' if part.sides == 2 else part.sides} sides together" if part.sides > 1 else ""
-
-
-# The short names of what a rider and a designer want: kind of the channel, statistic, whether it is weighted.
-GOALS = {
-    "comfort": (ChannelKind.ACCELERATION, "rms", True),
-    "travel": (ChannelKind.STROKE, "peak_to_peak", False),
-    "grip": (ChannelKind.TYRE_LOAD, "rms", False),
-}
 
 
 def ride_metrics_of(frame: Frame, channels: Sequence[Channel]) -> tuple[Metric, ...]:
@@ -238,91 +254,3 @@ def _of_tyres(frame: Frame) -> list[Metric]:
         of_load = ("road_stress_factor", "lift_off_fraction")
         metrics += [Metric(relative, statistic, name=prefixed(wheel.name, statistic)) for statistic in of_load]
     return metrics
-
-
-def is_stationary(metric: Metric, channels: Mapping[str, Channel]) -> bool:
-    """Whether a metric follows from the RMS of its channel on a white road.
-
-    Absolute heights have no finite RMS there, since they follow the road.
-
-    Arguments:
-        metric: the metric.
-        channels: of the vehicle, by name.
-    """
-    unbounded = metric.from_rest and channels[metric.channel].kind is ChannelKind.HEIGHT
-    return metric.statistic.of_rms is not None and not (unbounded or metric.by or metric.window)
-
-
-def metrics_of_goal(
-    metrics: Sequence[Metric], channels: Mapping[str, Channel], goal: str, *, white: bool = False
-) -> list[str]:
-    """The names of the ride metrics that a short name means, as `goal_metrics` says."""
-    kind, statistic, weighted = GOALS[goal]
-    statistic = "standard_deviation" if white and kind is ChannelKind.STROKE else statistic
-    names = [
-        m.name
-        for m in metrics
-        if channels[m.channel].kind is kind and m.statistic.name == statistic and (m.weighting is not None) == weighted
-    ]
-    return names[:1] if goal == "comfort" else names
-
-
-def chosen_metrics(
-    metrics: Sequence[Metric],
-    channels: Mapping[str, Channel],
-    wanted: Sequence[str | Metric] | None,
-    argument: str,
-    *,
-    white: bool = False,
-) -> list[Metric]:
-    """The requested metrics, checked and with their weightings.
-
-    Arguments:
-        metrics: the predefined ride metrics of the vehicle.
-        channels: channels of the vehicle, by name.
-        wanted: names of ride metrics, or metrics of any channel; "comfort", "travel" and "grip" mean those of
-            `goal_metrics`; None for all ride metrics.
-        argument: name of this argument in error messages.
-        white: for stationary rides on a white road.
-
-    Raises:
-        ValueError: an empty list; an unknown name or channel, with the nearest known one; a weighting of a channel that
-            is not an acceleration; two metrics of one name.
-    """
-    known = {m.name: m for m in metrics}
-    if wanted is None:
-        return list(metrics)
-    if isinstance(wanted, Metric):
-        _checks.refuse(argument, "be a list", "one Metric", f"Write `{argument}=[metric]`.")
-    if not len(wanted):
-        some = ", ".join(map(repr, list(known)[:3]))
-        _checks.refuse(argument, "name one or more", "empty", f"Write [{some}], or leave it out for all.")
-    if not isinstance(wanted, str):
-        spelled = {goal: metrics_of_goal(metrics, channels, goal, white=white) for goal in GOALS}
-        lists = [(isinstance(one, str) and spelled.get(one)) or [one] for one in wanted]
-        wanted = list(itertools.chain.from_iterable(lists))
-    names = [m for m in wanted if not isinstance(m, Metric)] if not isinstance(wanted, str) else wanted
-    current = iter(current_names(argument, names, known))
-    chosen = [of_channel(m, channels, argument) if isinstance(m, Metric) else known[next(current)] for m in wanted]
-    return _of_different_names(chosen, argument)
-
-
-def _of_different_names(metrics: Sequence[Metric], argument: str) -> list[Metric]:
-    """The metrics, each once; two of one name are refused."""
-    by_name: dict[str, Metric] = {}
-    for metric in metrics:
-        if by_name.setdefault(metric.name, metric) != metric:
-            remedy = "Give one of them another: `Metric(..., name=...)`."
-            _checks.refuse(argument, "have one metric of each name", f"two of {metric.name!r}", remedy)
-    return list(by_name.values())
-
-
-def of_channel(metric: Metric, channels: Mapping[str, Channel], argument: str) -> Metric:
-    """The metric after a check of its channels, with the weighting of its channel instead of "default"."""
-    for name in (metric.channel, metric.by) if metric.by else (metric.channel,):
-        _checks.one_of(f"channel of {argument}", name, channels)
-    own = channels[metric.channel].kind.weighting
-    if metric.weighting is not None and own is None:
-        remedy = f"Leave its `weighting` out; {metric.channel} is {channels[metric.channel].kind.meaning}."
-        _checks.refuse(argument, "weight an acceleration, as ISO 2631-1 does", repr(metric.channel), remedy)
-    return metric.weighted_by(own) if metric.weighting == "default" else metric

@@ -69,14 +69,10 @@ class LiftOffWithLaws(AbstractWrapper):
     A wheel without mass, as of a `TrackedHull`, exerts no force on the vehicle in the air. The stroke of its laws still
     follows the ground, so their own channels have no meaning in the air, and contact begins again when the total force
     becomes a push.
-
-    Arguments:
-        linear: the correction for the linear spring and dashpot.
-        law: the sum of the laws between wheel and road.
     """
 
-    linear: LiftOff
-    law: AbstractDamper
+    linear: LiftOff  # the correction for the linear spring and dashpot
+    law: AbstractDamper  # the sum of the laws between wheel and road
 
     def inner_law(self) -> AbstractDamper:
         """The laws parallel to the tyre."""

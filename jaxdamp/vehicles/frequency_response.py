@@ -54,14 +54,22 @@ def frequency_response(
     if by_wheel and speed is not None:
         _checks.refuse("speed", "be left out with `by_wheel`", speed, "Multiply by exp(−2πi f τ) as the roads need.")
     linear = as_linear(vehicle)
-    gains = gains_by_wheel(linear, points)
-    if not by_wheel:
-        gains = jnp.sum(gains * phase_factors(points, linear.delays(speed, in_phase))[:, None], axis=2)
-    return {name: gains[:, i] for i, name in enumerate(linear.channels)}
+    gains = _of_channels(linear, points, None if by_wheel else linear.delays(speed, in_phase))
+    return dict(zip(linear.channels, gains, strict=True))
 
 
 @eqx.filter_jit
-def gains_by_wheel(
+def _of_channels(
+    linear: LinearVehicle, frequency: Float[Array, " frequencies"], delays: Float[Array, " wheels"] | None
+) -> list[Complex[Array, "..."]]:
+    """Gain of every channel, of all wheels together if their delays are given."""
+    gains = _gains_by_wheel(linear, frequency)
+    if delays is not None:
+        gains = jnp.sum(gains * _phase_factors(frequency, delays)[:, None], axis=2)
+    return list(jnp.moveaxis(gains, 1, 0))
+
+
+def _gains_by_wheel(
     linear: LinearVehicle, frequency: Float[Array, " frequencies"]
 ) -> Complex[Array, "frequencies channels wheels"]:
     """Gain of every channel from the height under each wheel."""
@@ -81,7 +89,7 @@ def gains_by_wheel(
     return c @ states + d + s * f
 
 
-def phase_factors(
+def _phase_factors(
     frequency: Float[Array, " frequencies"], delays: Float[Array, " wheels"]
 ) -> Complex[Array, "frequencies wheels"]:
     """exp(−2πi f τ)."""
@@ -139,8 +147,7 @@ def spectral_rms(
     if levels.shape != points.shape:
         _checks.refuse("density", f"have the shape {points.shape} of `frequency`", f"of shape {levels.shape}")
     linear = as_linear(vehicle)
-    gains, factors = gains_by_wheel(linear, points), phase_factors(points, linear.delays(speed, in_phase))
-    shared = sides = None
+    shared = None
     if coherence is not None:
         shared = jnp.asarray(coherence, dtype=float)
         if shared.shape != points.shape:
@@ -149,14 +156,25 @@ def spectral_rms(
         if offsets is not None and (offsets == 0).any():
             remedy = "Take a `RollCar` or a `FullCar`, or leave it out."
             _checks.refuse("coherence", "be left out where a wheel stands for both sides", "given", remedy)
-        sides = (linear.left > 0)[None, None, :]
+    rms = _rms_of_channels(linear, points, levels, linear.delays(speed, in_phase), shared)
+    return dict(zip(linear.channels, rms, strict=True))
 
-    delayed = gains * factors[:, None]
-    if sides is None or shared is None:
+
+@eqx.filter_jit
+def _rms_of_channels(
+    linear: LinearVehicle,
+    frequency: Float[Array, " frequencies"],
+    density: Float[Array, " frequencies"],
+    delays: Float[Array, " wheels"],
+    coherence: Float[Array, " frequencies"] | None,
+) -> list[Scalar]:
+    delayed = _gains_by_wheel(linear, frequency) * _phase_factors(frequency, delays)[:, None]
+    if coherence is None:
         squares = jnp.abs(jnp.sum(delayed, axis=2)) ** 2
     else:
+        sides = (linear.left > 0)[None, None, :]
         left, right = (jnp.sum(jnp.where(side, delayed, 0.0), axis=2) for side in (sides, ~sides))
-        squares = jnp.abs(left) ** 2 + jnp.abs(right) ** 2 + 2.0 * shared[:, None] * jnp.real(left * jnp.conj(right))
-    spectra = squares * levels[:, None]
-    rms = root(jnp.sum(0.5 * (spectra[1:] + spectra[:-1]) * jnp.diff(points)[:, None], axis=0))
-    return {name: rms[i] for i, name in enumerate(linear.channels)}
+        both = coherence[:, None] * jnp.real(left * jnp.conj(right))
+        squares = jnp.abs(left) ** 2 + jnp.abs(right) ** 2 + 2.0 * both
+    spectra = squares * density[:, None]
+    return list(root(jnp.sum(0.5 * (spectra[1:] + spectra[:-1]) * jnp.diff(frequency)[:, None], axis=0)))

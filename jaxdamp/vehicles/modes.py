@@ -8,9 +8,8 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 
 from jaxdamp import _checks
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Contents, Table, plain, with_unit
-from jaxdamp._types import Figure
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.linear import LinearVehicle, as_linear, linearise
 
@@ -53,11 +52,7 @@ class Modes(AbstractResult):
         """−Re λ/|λ|."""
         return -np.real(self.poles) / np.abs(self.poles)
 
-    def plot(self) -> Figure:
-        """The shape of each oscillation (`plots.modes`)."""
-        from jaxdamp import plots
-
-        return plots.modes(self)
+    plot = drawn_by("modes", "The shape of each oscillation.")
 
     def table(self) -> Table:
         """A row for each damped oscillation, with the coordinates of largest amplitude."""

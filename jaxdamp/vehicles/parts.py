@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.parameters import Module, as_float, check_parameters, nonnegative, parameter, positive, readable
+from jaxdamp.parameters import AbstractDeclared, as_float, nonnegative, parameter, positive
 
 
 def _is_one(coefficient: object) -> bool:
@@ -92,14 +92,8 @@ def _maybe(value: object) -> Any:
     return None if value is None else as_float(value)
 
 
-class AbstractPart(Module):
+class AbstractPart(AbstractDeclared):
     """A part of a vehicle with its own parameters."""
-
-    def __check_init__(self) -> None:
-        check_parameters(self)
-
-    def __repr__(self) -> str:
-        return readable(self)
 
 
 @final
@@ -276,7 +270,9 @@ class Wheel(AbstractPart):
 
 @final
 class Place(AbstractPart):
-    """A place on the body where the acceleration is of interest: channels `z_{name}` and `{name}_acceleration`.
+    """A place on the body where the acceleration is of interest.
+
+    It has the channels `z_{name}`, `{name}_velocity` and `{name}_acceleration`.
 
     Arguments:
         name: name of the place.

@@ -151,17 +151,11 @@ def _outputs(
 
 @final
 class LinearLaws(eqx.Module):
-    """(f, ṡ) = constant + slopes (x, v, s): forces and rates of the states, from deflections, rates and states.
+    """(f, ṡ) = constant + slopes (x, v, s): forces and rates of the states, from deflections, rates and states."""
 
-    Attributes:
-        constant: shape (laws + states,).
-        slopes: shape (laws + states, 2 laws + states).
-        ports: the port of each law; several laws may share one.
-    """
-
-    constant: Float[Array, " answers"]
-    slopes: Float[Array, "answers motions"]
-    ports: tuple[int, ...] = eqx.field(static=True)
+    constant: Float[Array, " answers"]  # shape (laws + states,)
+    slopes: Float[Array, "answers motions"]  # shape (laws + states, 2 laws + states)
+    ports: tuple[int, ...] = eqx.field(static=True)  # the port of each law; several laws may share one
 
     @property
     def count(self) -> int:

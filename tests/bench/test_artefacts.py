@@ -82,6 +82,34 @@ def test_clean_records_of_all_kinds_raise_nothing() -> None:
     assert not any(alarms(seed) for seed in range(14))
 
 
+def short(seed: int) -> BenchRun:
+    """A clean sine record of three cycles, or of four."""
+    run = made.clean(seed, "qct")
+    return run.process(between=(run.time[0], run.time[0] + (3 + seed % 2) / run.frequency))
+
+
+def begins_late(seed: int) -> bool:
+    """Whether a force that is late by 20 ms from between 30 and 70 % of a short record is found."""
+    run, rng = short(seed), np.random.default_rng([seed, 7])
+    begin, delay = rng.uniform(0.3, 0.7) * run.duration, 0.02 * rng.choice([-1.0, 1.0])
+    found = preflight(made.late(run, delay, begin)).named("delay changes")
+    sized = [abs(f.size - delay) < 0.1 * abs(delay) for f in found if f.size is not None]
+    placed = [abs(f.between[0] - run.time[0] - begin) < 0.15 / run.frequency for f in found if f.between is not None]
+    return sized == placed == [True]
+
+
+def test_a_delay_that_begins_within_three_or_four_cycles_is_found() -> None:
+    assert all(begins_late(seed) for seed in range(4))
+    drifting = [made.changed(run, force=run.force * (1.0 - 0.02 * run.time)) for run in map(short, range(4))]
+    assert not any(preflight(run).named("delay changes") for run in [*map(short, range(4)), *drifting])
+
+
+@pytest.mark.slow
+def test_a_delay_that_begins_within_three_or_four_cycles_is_found_in_29_of_30() -> None:
+    assert sum(begins_late(seed) for seed in range(30)) >= 29
+    assert not any(preflight(short(seed)).named("delay changes") for seed in range(200))
+
+
 @pytest.mark.slow
 def test_200_clean_records_raise_nothing() -> None:
     assert {seed: found for seed in range(210) if (found := alarms(seed))} == {}

@@ -5,7 +5,8 @@ import pint
 import pytest
 
 from jaxdamp.bench import units
-from jaxdamp.bench.columns import Choice, find_columns as find, role_of
+from jaxdamp.bench.columns import Choice, find_columns as find
+from jaxdamp.bench.headers import role_of
 from jaxdamp.bench.raw import RawColumn, RawTable
 from jaxdamp.bench.units import conversion
 

@@ -38,8 +38,11 @@ def test_bad_rows_are_left_out_on_request_and_counted(tmp_path):
     for at in (50, 51, 200):
         rows[at] = f"{TIME[at]:.4f},,NaN"
     (tmp_path / "a.csv").write_text("\n".join(["t_s,x_mm,F_N", *rows]))
-    with pytest.raises(ValueError):
+    with pytest.raises(ValueError) as refused:
         bench.read(tmp_path / "a.csv")
+    missing = "line 52, column 'x_mm': the value is missing (3 such values in all). Mend or remove the line, or"
+    nan = "line 52: the force (column 'F_N') is nan (3 such values in all). Cut the record there or mend it. Or"
+    assert all(f"{what} pass drop_bad_rows=True." in str(refused.value) for what in (missing, nan))
     run = bench.read(tmp_path / "a.csv", drop_bad_rows=True)[0]
     assert len(run) == 400 and "3 bad rows left out, straight lines instead; the first is line 52" in run.describe()
     assert np.allclose(run.force, 500 * np.cos(9 * run.time), atol=3.0)

@@ -1,10 +1,22 @@
 from pathlib import Path
 
+import matplotlib.figure
 import pytest
 
 from jaxdamp import bench
 from jaxdamp.bench import BenchSet, SineTest
 from jaxdamp.dampers import Bilinear
+from jaxdamp.report import page
+
+
+@pytest.fixture(autouse=True)
+def pictures_where_looked_at(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drawing takes half the time of a command: figures are made in all tests, drawn in `pictures` and long ones."""
+    if any(request.node.get_closest_marker(kind) for kind in ("pictures", "slow", "exhaustive")):
+        return
+    blank = page._png(matplotlib.figure.Figure(figsize=(0.1, 0.1)))
+    monkeypatch.setattr(page, "_png", lambda figure: blank)
+    monkeypatch.setattr(matplotlib.figure.Figure, "savefig", lambda figure, path, **_: Path(path).write_bytes(b""))
 
 
 @pytest.fixture(scope="session")

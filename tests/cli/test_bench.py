@@ -34,6 +34,7 @@ def rows(path: Path) -> list[dict[str, str]]:
     return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
 
 
+@pytest.mark.pictures
 def test_bench_prints_and_writes_preflight_evaluation_and_limits(folder: Path, tmp_path: Path) -> None:
     limits, out = tmp_path / "limits.csv", tmp_path / "out"
     limits.write_text(
@@ -43,6 +44,8 @@ def test_bench_prints_and_writes_preflight_evaluation_and_limits(folder: Path, t
     words = ["--limits", limits, "--baseline", tmp_path / "softer.json", "--cycles", "last:4"]
     text = jaxdamp("bench", folder, *words, "--out", out, code=1).output
     flat = " ".join(text.split())
+    answer, table = flat.index("are kept: NOT PASSED."), flat.index("Forces at stated velocities")
+    assert answer < table and flat.index(" N in rebound and ") < table
     assert "rest before" not in flat  # it is cut off
     for said in (
         "1 error,",
@@ -94,7 +97,7 @@ def test_fit_refuses_a_wrong_unit_unless_it_is_said_or_told_to_keep_it(tmp_path:
     words = ["fit", tmp_path / "run.csv", "--law", "bilinear", "--out", tmp_path / "out"]
     said = refused(tmp_path, *words)
     assert "the stroke looks 1000 times too large, mm taken for m" in said and "amplitude 10 m" in said
-    assert "--units stroke=mm" in said and "With --keep-bad" in said
+    assert "--units stroke=mm" in said and "With --keep-bad" in said and "error: run" not in said
     jaxdamp(*words, "--units", "stroke=mm")
     assert from_json(tmp_path / "out/best_law.json").rebound_rate == pytest.approx(2600.0, rel=0.01)
     jaxdamp(*words, "--keep-bad", "--replace")
@@ -131,6 +134,7 @@ def test_settings_in_names_are_not_pooled(tmp_path: Path) -> None:
     assert 1500.0 < from_json(tmp_path / "pooled" / "best_law.json").rebound_rate < 2500.0
 
 
+@pytest.mark.pictures
 def test_settings_stated_on_the_command_line(folder: Path, tmp_path: Path) -> None:
     words = ("--command", "*_1Hz=1,*_2Hz=2,*_4Hz=2,clipped=3", "--velocities", "0.03,0.05")
     text = jaxdamp("bench", folder, *words, "--keep-rest", "--out", tmp_path / "out").output
@@ -222,14 +226,14 @@ def test_a_group_that_cannot_be_fitted_costs_that_group_alone(folder: Path, tmp_
 
     def failing(screen, names, runs, held_out, **options):
         if [run.name for run in runs] == ["10mm_1Hz"]:
-            raise ValueError("None of 1 laws could be fitted.")
+            raise ValueError("The law linear could not be fitted.")
         return original(screen, names, runs, held_out, **options)
 
     monkeypatch.setattr(fitting, "fit_laws", failing)
     files = [folder / f"10mm_{speed}Hz.csv" for speed in (1, 2)]
     words = ("--command", "*_1Hz=0.5,*_2Hz=1", "--group-by", "command", "--law", "linear", "--out", tmp_path / "out")
     text = " ".join(jaxdamp("fit", *files, *words).output.split())
-    assert "command_0.5: None of 1 laws could be fitted." in text
+    assert "command_0.5: The law linear could not be fitted." in text
     assert (tmp_path / "out" / "command_1" / "best_law.json").is_file()
 
 

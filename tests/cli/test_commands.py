@@ -78,6 +78,7 @@ def test_fit_writes_laws_that_load_again(records: Path, tmp_path: Path) -> None:
         assert said in text
 
 
+@pytest.mark.pictures
 def test_fit_writes_tables_pictures_and_a_report(records: Path, tmp_path: Path) -> None:
     out, old = tmp_path / "fit", tmp_path / "old.json"
     to_json(Linear(2000.0), old)

@@ -32,14 +32,14 @@ def test_a_wrong_path_is_answered_without_jax(tmp_path: Path) -> None:
         "fit nosuch.csv": "There is no file 'nosuch.csv'",
         "fit-vehicle nosuch.toml a.csv": "VEHICLE must be a file that is there, but is nosuch.toml",
         "bench full": "Folder full holds no *.csv",
-        "ride broken.json": "LAW must be a law as JSON, but is broken.json",
+        "ride broken.json": "LAW must be a law as JSON, but is broken.json, which is no JSON: Expecting property name",
         "tune quarter_car_000 iso_C": "ROAD must be iso:CLASS, bump:HEIGHT:LENGTH or a file that is there",
         "sweep quarter_car_000 iso:C --over damper.rate=1:2:3 --start x.json": "Option --start must be a file",
         "report a.csv --manifest no.toml": "Option --manifest must be a file that is there, but is no.toml",
         "export no.json --to c": "LAW must be a file that is there, but is no.json",
-        "ride deep.json": "LAW must be a law as JSON, but is deep.json: it is nested too deeply",
-        "tune deep.toml iso:C": "deep.toml is no valid TOML: a key has more than 20 parts",
-        "tune latin.toml iso:C": "latin.toml is no TOML in UTF-8",
+        "ride deep.json": "LAW must be a law as JSON, but is deep.json, which is no JSON: it is nested too deeply",
+        "tune deep.toml iso:C": "deep.toml, which is no valid TOML: a key has more than 20 parts",
+        "tune latin.toml iso:C": "latin.toml, which is no TOML in UTF-8",
         "fit a.csv --out full": "The folder 'full' is not empty and was not written by jaxdamp",
     }
     done = subprocess.run(

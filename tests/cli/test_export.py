@@ -56,6 +56,8 @@ def test_refusals(law: Path) -> None:
     assert "Option --to must be one of" in refused(folder, "export", law, "--to", "adam")
     assert "--velocities must be FROM:TO:POINTS" in refused(folder, "export", law, "--to", "csv", "--velocities", "1")
     assert "be left out for fmu" in refused(folder, "export", law, "--to", "fmu", "--velocities", "-1:1:3")
+    assert "--part must be left out for csv" in refused(folder, "export", law, "--to", "csv", "--part", "controller")
+    assert "which has no controller" in refused(folder, "export", law, "--to", "c", "--part", "controller")
     to_json(sine(amplitude=0.01, frequency=1.0), folder / "road.json")
     assert "LAW must be a law as JSON" in refused(folder, "export", folder / "road.json", "--to", "csv")
     jaxdamp("export", law, "--to", "csv")

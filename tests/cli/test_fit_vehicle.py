@@ -129,6 +129,30 @@ def test_bench_records_guides_and_two_records_in_one_fit(files: dict[str, Path],
     assert "car.damper force" in text and (out / "car_damper_force_velocity.png").is_file()
 
 
+@pytest.mark.slow
+def test_forms_of_friction_are_compared_and_the_recommended_vehicle_is_written(
+    files: dict[str, Path], tmp_path: Path
+) -> None:
+    rig = vehicles.Guided(CAR, (vehicles.Guide(CoulombFriction(40.0, 0.01)),))
+    for seed in (0, 1):
+        how = {"duration": 3.0, "sampling_rate": 250.0, "finer": 4, "name": f"drive {seed}"}
+        road = roads.iso8608("C", speed=20.0, seed=seed)
+        identify.virtual_ride(rig, road, NOISE, **how).to_csv(tmp_path / f"{seed}.csv")
+    words = ["--start", files["law.json"], "--guide", "sprung:friction=25", "--friction", "none,coulomb"]
+    free = "unsprung_mass,spring_rate,tyre_stiffness,damper.*_rate"
+    words += ["--dt", "2e-3", "--over", free, "--out", tmp_path / "out"]
+    shown = jaxdamp("fit-vehicle", files["car.toml"], tmp_path / "0.csv", tmp_path / "1.csv", *words).output
+    text = " ".join(shown.split())  # lines are as long as the terminal is wide
+    assert "Recommended: coulomb" in text and "each of 2 drives predicted by fits without it" in text
+    told = json.loads((tmp_path / "out" / "comparison.json").read_text())
+    assert told["best"] == "coulomb" and list(told["vehicles"]) == ["none", "coulomb"]
+    car = from_json(tmp_path / "out" / "vehicle.json")
+    assert float(car.guides[0].law.friction_force) == pytest.approx(40.0, rel=0.05)
+    assert from_json(tmp_path / "out" / "vehicles" / "none.json").guides[0].law is None
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert page.index("How good the vehicles are") < page.index("The recommended vehicle: coulomb")
+
+
 WRONG = [
     (["--sensor", "stroke"], "Option --sensor must read like NAME:NUMBER=START"),
     (["--sensor", "strok:offset"], "Did you mean 'stroke'?"),
@@ -137,6 +161,7 @@ WRONG = [
     (["--sensor", "stroke:high_pass"], "give a number for high_pass"),
     (["--guide", "sprung:friction"], "give a number for friction"),
     (["--guide", "body:friction=40"], "Option --guide must be one of 'sprung', 'unsprung'"),
+    (["--friction", "dhal"], "Did you mean 'dahl'?"),
     (["--over", "sprin_rate"], "did you mean 'spring_rate'"),
     (["--noise", "stroke=small"], "Option --noise must be numbers"),
     (["--initial-motion", "moving"], "Option --initial-motion must be one of 'rest', 'free'"),

@@ -44,7 +44,8 @@ def _fit(law: AbstractDamper, folder: Path, laws: str) -> Path:
 def test_odd_dampers_give_laws_tables_and_pictures(tmp_path: Path, name: str) -> None:
     laws = ["besinger_series_spring", "bouc_wen", "linear", "lugre_spring"]
     out = _fit(DAMPERS[name], tmp_path, ",".join(laws))
-    assert sorted(path.stem for path in (out / "laws").iterdir()) == laws
+    written = [path.stem for path in (out / "laws").iterdir()]
+    assert sorted(name for name in written if not name.endswith("_reduced")) == laws  # and what is left of one in doubt
     rows = (out / "best_law_force_velocity.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) > 100 and not any("nan" in row for row in rows if not row.startswith("#"))
     assert (

@@ -8,7 +8,9 @@ import pytest
 from rich.console import Console
 
 from jaxdamp import bench, identify
+from jaxdamp._words import said
 from jaxdamp.bench import BenchSet, SineTest, VirtualDyno
+from jaxdamp.cli import application
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.fitting import Fitted, show, write_fits
 from jaxdamp.cli.wording import in_command_line
@@ -41,7 +43,7 @@ def test_verdict_object_file_and_page_never_disagree(situation: str, tmp_path: P
     assert repr(comparison).endswith(f"\nbest: {best.name}")
     assert json.loads(json.dumps(comparison.to_dict()))["best"] == best.name
     assert [r["law"] for r in comparison.table().records() if "recommended" in str(r["note"])] == [best.name]
-    assert f"Recommended: {best.name}, " in fit_report(comparison).to_html()
+    assert said(f"Recommended: {best.name}, ") in fit_report(comparison).to_html()
     screen, text = Screen(), io.StringIO()
     screen.console = Console(file=text, width=400)
     show(screen, Fitted(comparison, []))
@@ -68,11 +70,30 @@ def test_verdict_object_file_and_page_never_disagree(situation: str, tmp_path: P
             "Laws of velocity have none: subtract it, `process(without=bench.separate_gas_and_friction(run))`.",
             "--rig gas",
         ),
+        (
+            "80 % is shape, of the curve: try piecewise_linear or table, which follow any",
+            "--law piecewise_linear,table",
+        ),
         ("Laws with memory and means suffer: `process(moving=True)` cuts it off.", "--keep-rest"),
         ('If it is mm, read the file with `units={"stroke": "mm"}`.', "--units stroke=mm"),
+        ('Or fit the heat beside the law, `rig="heat"`.', "--rig heat"),
+        ('Name the columns: `columns={"stroke": ..., "force": ...}`.', "--columns stroke=...,force=..."),
+        (
+            "They lie at rate = 1. Look at them with `data.where(data.failed, drop=True)`, and at `data.reason`.",
+            "sweep.csv",
+        ),
+        ("It has no peaks. Drive over `roads.iso8608(...)`.", "Take iso:CLASS."),
+        ("State it as held, `run.held_at(0.5)`, so that the record has one setting.", "--command NAME=0.5"),
+        ("Argument `bounds['rate']` must increase.", "Option --bound of 'rate' must"),
+        ("Argument `law.rate` must be above 0.", "law.rate must"),
+        ("Pass `dt=0.0005`, or more.", "--dt 0.0005,"),
     ],
 )
-def test_the_command_line_names_options_instead_of_calls(said: str, option: str) -> None:
-    assert (
-        option in in_command_line(said) and "`" not in in_command_line(said) and "process(" not in in_command_line(said)
-    )
+def test_the_command_line_names_options_instead_of_calls(
+    monkeypatch: pytest.MonkeyPatch, said: str, option: str
+) -> None:
+    monkeypatch.setitem(application.own_words(), "bounds", "Option --bound")
+    for argument in ("units", "columns", "dt"):
+        monkeypatch.setitem(application.own_words(), argument, f"Option --{argument}")
+    words = in_command_line(said)
+    assert option in words and "`" not in words and "process(" not in words

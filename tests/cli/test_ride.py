@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from jaxdamp import roads, simulate, vehicles
+from jaxdamp.cli.application import own_words
 from jaxdamp.cli.controlling import parse_policy
 from jaxdamp.cli.jobs import with_step_warnings
 from jaxdamp.cli.riding import Driving, parse_road
 from jaxdamp.cli.vehicle_words import presets
+from jaxdamp.cli.wording import in_command_line
 from jaxdamp.control import Controlled, Skyhook
 from jaxdamp.dampers import AbstractDamper, Bilinear, Linear, Scheduled
 from jaxdamp.export import to_json
@@ -28,6 +30,7 @@ def _written(law: AbstractDamper, path: Path) -> Path:
     return path
 
 
+@pytest.mark.pictures
 def test_ride_compares_a_law_with_a_baseline(law: Path, tmp_path: Path) -> None:
     base, out = _written(Linear(1500.0), tmp_path / "base.json"), tmp_path / "ride"
     words = [
@@ -58,7 +61,7 @@ def test_ride_compares_a_law_with_a_baseline(law: Path, tmp_path: Path) -> None:
     pictures = {"ride_sheet.png", "ride_sheet.pdf", "ride.png", "front_damper.png", "rear_damper.png"}
     tables = {"metrics.csv", "comfort.csv", "channels_law.csv", "channels_baseline.csv"}
     files = {file.name for file in out.iterdir()}
-    assert files == pictures | tables | {"law.json", "baseline.json", "report.html", "manifest.json"}
+    assert files == pictures | tables | {"law.json", "baseline.json", "report.html", "animation.html", "manifest.json"}
     assert (out / "law.json").read_text() == law.read_text()
 
 
@@ -77,6 +80,7 @@ def test_wrong_words_are_refused(law: Path, tmp_path: Path, words: list[str], me
     assert message in refused(tmp_path, "ride", law, *words, "--out", tmp_path / "out")
 
 
+@pytest.mark.pictures
 def test_a_controller_is_compared_with_the_law_at_its_own_command(tmp_path: Path) -> None:
     damper = Scheduled((Linear(1000.0), Linear(6000.0)), levels=[0.0, 1.0], command=0.25)
     words = ["--controller", "skyhook:gain=3000,lead=0.01", "--delay", "0.002", "--actuator-lag", "0.003"]
@@ -90,6 +94,8 @@ def test_a_controller_is_compared_with_the_law_at_its_own_command(tmp_path: Path
         expected = float(simulate(vehicle, road, duration=1.0).metrics(["comfort"])["weighted_rms_sprung_acceleration"])
         assert float(rows["weighted_rms_sprung_acceleration"][column]) == pytest.approx(expected, rel=1e-9)
     assert (out / "ride_sheet.png").exists() and "front_damper_command" in (out / "channels_law.csv").read_text()
+    jaxdamp("export", out / "vehicle.json", "--to", "c", "--part", "controller", "--file", tmp_path / "ecu.c")
+    assert "p->policy_gain = 3000.0;" in (tmp_path / "ecu.c").read_text()
     with pytest.raises(AssertionError, match="take a command"):
         jaxdamp("ride", _written(Linear(1500.0), tmp_path / "linear.json"), *words, "--out", tmp_path / "other")
 
@@ -101,17 +107,21 @@ def test_a_controller_is_compared_with_the_law_at_its_own_command(tmp_path: Path
         ("skyhook:gin=1", "must be one of 'gain', 'lead'"),
         ("skyhook:3000", "must read like skyhook:gain=3000"),
         ("power-driven", "must have a stiffness"),
+        ("preview:gain=500", "must have a delay"),
+        ("lqr:weight=1", "must be one of 'stroke', 'tyre'"),
+        ("none.json", "a file that is there"),
     ],
 )
 def test_a_wrong_controller_is_refused(word: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        parse_policy(word)
+        parse_policy(word, vehicles.presets.quarter_car_000())
 
 
-def test_a_coarse_step_is_said_in_the_words_of_the_command_line() -> None:
+def test_a_coarse_step_is_said_in_the_words_of_the_command_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(own_words(), "dt", "Option --dt")
     car, bump = vehicles.presets.quarter_car_000(), roads.cosine_bump(0.05, start=0.1, duration=0.25)
     _, said = with_step_warnings(lambda: simulate(car, bump, duration=1.0, dt=0.02))
-    assert len(said) == 1 and "estimated at" in said[0] and "`--dt 0.00" in said[0]
+    assert len(said) == 1 and "estimated at" in said[0] and " --dt 0.00" in in_command_line(said[0])
     assert with_step_warnings(lambda: simulate(car, bump, duration=1.0, dt=0.002))[1] == []
 
 

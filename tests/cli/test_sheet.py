@@ -19,6 +19,7 @@ def sheet(tmp_path: Path) -> Path:
     return tmp_path / "sheet.csv"
 
 
+@pytest.mark.pictures
 def test_a_sheet_becomes_a_family_and_a_best_click(sheet: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = sheet.parent
     monkeypatch.chdir(folder)

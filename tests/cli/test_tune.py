@@ -5,11 +5,15 @@ import json
 from pathlib import Path
 from typing import Any
 
+import equinox as eqx
+import numpy as np
 import pytest
 
 from jaxdamp import vehicles
+from jaxdamp.cli.controlling import parse_policy
 from jaxdamp.cli.vehicle_words import parse_vehicle
-from jaxdamp.dampers import Bilinear, Linear
+from jaxdamp.control import Skyhook
+from jaxdamp.dampers import Bilinear, Linear, Scheduled
 from jaxdamp.export import from_json, to_json
 
 from .invoking import jaxdamp, refused
@@ -29,6 +33,7 @@ def _toml(folder: Path, text: str) -> Path:
     return folder / "car.toml"
 
 
+@pytest.mark.pictures
 def test_tune_writes_a_better_law(law: Path, tmp_path: Path) -> None:
     out = tmp_path / "tuned"
     words = [
@@ -46,7 +51,7 @@ def test_tune_writes_a_better_law(law: Path, tmp_path: Path) -> None:
     assert float(from_json(out / "law.json").rate) == pytest.approx(BEST, rel=1e-4)
     assert float(from_json(out / "vehicle.json").damper.rate) == pytest.approx(BEST, rel=1e-4)
     rows = {row["metric"]: row for row in csv.DictReader((out / "metrics.csv").read_text().splitlines())}
-    assert rows["rms_dynamic_tyre_load"]["note"] == "limit 1400" and float(rows["working_space_rms"]["after"]) < 0.02
+    assert rows["rms_dynamic_tyre_load"]["note"] == "limit 1400 N" and float(rows["working_space_rms"]["after"]) < 0.02
     assert "the change is from the baseline to the tuned vehicle" in (out / "report.html").read_text()
     assert json.loads((out / "tuning.json").read_text())["converged"] is True
     assert {file.name for file in out.iterdir()} == {
@@ -55,11 +60,55 @@ def test_tune_writes_a_better_law(law: Path, tmp_path: Path) -> None:
     }  # fmt: skip
 
 
+def test_the_numbers_of_a_controller_are_tuned_and_written_for_a_ride(tmp_path: Path) -> None:
+    car = vehicles.presets.quarter_car_000(Scheduled((Linear(900.0), Linear(6e3)), levels=[0.0, 1.0], command=0.2))
+    to_json(car, tmp_path / "car.json")
+    words = ["--controller", "skyhook:gain=2500", "--actuator-lag", "0.003", "--limit", "grip=none", "--max-steps", "2"]
+    out = tmp_path / "tuned"
+    words += ["--over", "policy.gain", "--duration", "2"]
+    text = jaxdamp("tune", tmp_path / "car.json", "bump:0.05:5", *words, "--out", out).output
+    assert "policy.gain" in text
+    rows = {row["metric"]: row for row in csv.DictReader((out / "metrics.csv").read_text().splitlines())}
+    weighted = rows["weighted_rms_sprung_acceleration"]
+    assert float(weighted["after"]) < float(weighted["before"])
+    tuned, policy = from_json(out / "vehicle.json"), parse_policy(str(out / "controller.json"), car)
+    assert isinstance(policy, Skyhook) and float(policy.gain) == float(tuned.policy.gain) > 2500.0
+    assert float(policy.lead) == 0.0 and float(tuned.actuator_lag) == 0.003
+    assert bool(eqx.tree_equal(tuned.car, car))  # the policy alone is tuned
+    message = refused(tmp_path, "tune", tmp_path / "car.json", "iso:C", "--controller", "modal-skyhook:gain=1")
+    assert "must be one of 'heave', 'pitch', 'roll'" in message
+    plain = refused(tmp_path, "tune", "quarter_car_000", "iso:C", "--controller", "skyhook")
+    assert "have a damper with one `Scheduled` law" in plain
+
+
+def test_limits_in_the_units_of_a_shop_are_those_in_si(tmp_path: Path) -> None:
+    """Also within a range, and printed back in the units that are shown; bounds of parameters too."""
+    words = ["tune", "quarter_car_000", "white:C", "--max-steps", "1", "--fresh-roads", "0"]
+    shop = ["--limit", "travel=0.5mm:2in,grip=400 lbf", "--limit", "comfort=0.1g"]
+    shop += ["--bound", "damper.rate=5lbf s/in:25 lbf s/in"]
+    output = jaxdamp(*words, *shop, "--show-units", "imperial", "--out", tmp_path / "shop").output
+    si = [
+        "--limit",
+        "travel=0.0005:0.0508,grip=1779.2886460902,comfort=0.980665",
+        "--bound",
+        "rate=875.634176:4378.17088",
+    ]
+    jaxdamp(*words, *si, "--out", tmp_path / "si")
+    assert "Limit of travel: 0.01969 to 2 in" in output and "Limit of grip: 400 lbf" in output
+    assert "limit 400 lbf" in output and "limits 0.01969 to 2 in" in output
+    written = [json.loads((tmp_path / name / "tuning.json").read_text()) for name in ("shop", "si")]
+    ends = [np.hstack([limit["value"] for limit in each["limits"].values()]).astype(float) for each in written]
+    np.testing.assert_allclose(*ends, rtol=1e-9)
+    (shop,), (si,) = (each["parameters"] for each in written)
+    np.testing.assert_allclose([shop["lower"], shop["upper"]], [si["lower"], si["upper"]], rtol=1e-8)
+
+
 def test_a_limit_that_is_not_met_ends_with_an_exit_code(tmp_path: Path) -> None:
     words = ["--limit", "travel=0.001", "--out", tmp_path / "tuned"]
     assert "is not met" in jaxdamp("tune", "quarter_car_000", "white:C", *words, code=1).output
 
 
+@pytest.mark.pictures
 def test_sweep_of_a_vehicle_from_a_file_writes_a_table_and_pictures(law: Path, tmp_path: Path) -> None:
     to_json(vehicles.presets.half_car_002(), tmp_path / "car.json")
     words = ["--over", "front.damper.rate=1000:2000:2", "--over", "rear.damper.rate=800;1600", "--metric", "comfort"]
@@ -75,8 +124,8 @@ def test_sweep_of_a_vehicle_from_a_file_writes_a_table_and_pictures(law: Path, t
     page, comfort = (out / "report.html").read_text(), "weighted_rms_sprung_acceleration [m/s²]"
     assert f"{len(within)} of 4 points are within all limits" in page
     best = min(within, key=lambda row: float(row[comfort]))
-    place = f"front.damper.rate = {float(best['front.damper.rate [N s/m]']):g} N s/m"
-    assert f"Smallest weighted rms sprung acceleration: {float(best[comfort]):.4g} m/s² at {place}" in page
+    place = f"front damper rate = {float(best['front.damper.rate [N s/m]']):g} N s/m"
+    assert f"Smallest body acceleration, weighted RMS: {float(best[comfort]):.4g} m/s² at {place}" in page
     assert "% from the baseline" in page
     assert (out / "weighted_rms_sprung_acceleration.png").is_file() and (out / "sweep.nc").is_file()
 
@@ -125,9 +174,19 @@ WRONG = [
     (["tune", "quarter_car_000", "white:C", "--limit", "trawel=0.1"], "Did you mean 'travel'?"),
     (["tune", "quarter_car_000", "white:C", "--limit", "travel=low"], "Option --limit must be a number, or two"),
     (["tune", "quarter_car_000", "white:C", "--limit", "travel=2:1"], "in increasing order"),
+    (["tune", "quarter_car_000", "white:C", "--limit", "travel=4lbf"], "must be in a unit of travel, such as m, but"),
+    (["tune", "quarter_car_000", "white:C", "--limit", "travel=2:4in"], "each with its unit or both in SI"),
     (["tune", "quarter_car_000", "white:C", "--limit", "travel=1,travel=2"], "name each thing once"),
     (["tune", "quarter_car_000", "white:C", "--over", "damper.rat"], "did you mean 'damper.rate'"),
     (["tune", "quarter_car_000", "white:C", "--bound", "rate"], "Option --bound must read like NAME=VALUE"),
+    (["tune", "quarter_car_000", "white:C", "--bound", "rate=5lbf:9lbf"], "must be in a unit of rate, such as N s/m"),
+    (["tune", "quarter_car_000", "white:C", "--bound", "rat=5lbf:9lbf"], "did you mean 'rate'"),
+    (["tune", "quarter_car_000", "white:C", "--bound", "rate=5:9N s/m"], "each with its unit or both in SI"),
+    (
+        ["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--metric", "peak_damper_velocity"],
+        "Option --metric must follow from an RMS on a white road",
+    ),
+    (["tune", "quarter_car_000", "white:C", "--minimise", "speed"], "Option --minimise must be one of"),
     (["tune", "quarter_car_000", "white:C", "--bound", "rate=3000:4000"], "must start between 3000 and 4000"),
     (["tune", "quarter_car_000", "white:C", "--bound", "sprung_mass=1:2"], "bound a parameter that is free"),
     (["tune", "quarter_car_000", "white:C", "--freeze", "*"], "nothing is left to change"),
@@ -144,6 +203,7 @@ WRONG = [
     (["sweep", "quarter_car_000", "white:C", "--over", "rat=1;2"], "did you mean 'rate'"),
     (["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--metric", "confort"], "Did you mean 'comfort'?"),
     (["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--limit", "trawel=1"], "Did you mean 'travel'?"),
+    (["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--limit", "grip=1in"], "in a unit of grip"),
     (["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--limit", "grip"], "must read like NAME=VALUE"),
     (["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--limit", "grip=2:1"], "in increasing order"),
 ]

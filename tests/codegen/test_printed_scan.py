@@ -15,7 +15,7 @@ from jaxdamp.sweeps import running
 
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
-ROWS = jnp.sin(jnp.arange(40.0)).reshape(20, 2)
+ROWS = jnp.asarray(np.sin(np.arange(40.0)).reshape(20, 2), float)
 RATE = "damper.rebound_rate"
 
 

@@ -21,7 +21,6 @@ from jaxdamp.control import (
     StateFeedback,
 )
 from jaxdamp.dampers import AbstractDamper, Bilinear, BoucWen, Lag, Linear, LuGre, MotionRatio, Scheduled, SeriesSpring
-from jaxdamp.export import to_c
 from jaxdamp.vehicles import Corner, HalfCar, QuarterCar, Seat, SeatMass
 
 
@@ -273,7 +272,6 @@ def test_single_precision_drives_too(car):
             "fixed steps",
         ),
         (lambda: simulation.harmonic_response(_period(5e-3), [1.0], 0.01), "for a periodic response"),
-        (lambda: to_c(_period(5e-3), "car.c"), "for C code and FMUs"),
     ],
 )
 def test_what_cannot_be_controlled_is_refused(make, message, tmp_path, monkeypatch):

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 import jaxdamp
 from jaxdamp import roads
-from jaxdamp.control import Controlled, Hybrid, PowerDriven, Skyhook
+from jaxdamp.control import Controlled, HybridHook, PowerDriven, RateLimit, Skyhook
 from jaxdamp.dampers import Linear, Scheduled
 from jaxdamp.vehicles import Corner, HalfCar, QuarterCar
 
@@ -32,7 +32,7 @@ def power_driven(y):
 
 POLICIES = {
     "skyhook": (Skyhook(3000.0, 0.01), skyhook),
-    "hybrid": (Hybrid(4000.0, 0.7), hybrid),
+    "hybrid": (HybridHook(4000.0, 0.7), hybrid),
     "power driven": (PowerDriven(20e3), power_driven),
 }
 
@@ -73,7 +73,7 @@ class Car:
         return np.stack([body, wheel, acceleration, (self.body - self.wheel) @ q, body - wheel])
 
 
-def by_events(car, policy, heights, dt, delay, lag, sensor_lag, fine):
+def by_events(car, policy, heights, dt, delay, lag, sensor_lag, fine, limits=None):
     """Velocities at instants dt apart, of which `fine` and more lie in a period, by DOP853 between the events."""
     own, wheels = Car(car), Car(car).wheels
     n = len(own.inertia)
@@ -94,24 +94,32 @@ def by_events(car, policy, heights, dt, delay, lag, sensor_lag, fine):
 
         def rate(t, y, command=command, target=target, start=start, slope=slope):
             u = target + (command - target) * (np.exp(-t / lag) if lag else 1.0)
-            return np.concatenate([y[n:], own.acceleration(y[:n], y[n:], start + slope * t, damping(u))])
+            ends = () if limits is None else np.clip((target - y[2 * n :]) / lag, *limits)
+            u = u if limits is None else y[2 * n :]
+            return np.concatenate(
+                [y[n : 2 * n], own.acceleration(y[:n], y[n : 2 * n], start + slope * t, damping(u)), ends]
+            )
 
+        y = y if limits is None else np.concatenate([y, command])
         y = solve_ivp(rate, (0.0, dt), y, method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
         command = target + (command - target) * (np.exp(-dt / lag) if lag else 1.0)
+        if limits is not None:
+            y, command = y[: 2 * n], y[2 * n :]
         rates.append(y[n:].copy())
     return np.array(rates)
 
 
-def largest_errors(car, name, steps, delay, lag, sensor_lag=0.0):
+def largest_errors(car, name, steps, delay, lag, sensor_lag=0.0, limits=None):
     """Of the velocities at each step, over the largest velocity, the road straight between instants 1 ms apart."""
     policy, own = POLICIES[name]
     road = roads.cosine_bump(0.06, start=0.2, length=1.6, speed=8.0)
     errors = []
     for dt in steps:
-        vehicle = Controlled(car, policy, lag, sensor_lag, period=PERIOD, delay=delay)
+        limit = None if limits is None else RateLimit(limits[1], -limits[0])
+        vehicle = Controlled(car, policy, lag, sensor_lag, period=PERIOD, delay=delay, rate_limit=limit)
         response = jaxdamp.simulate(vehicle, road, duration=DURATION, dt=dt)
         heights = np.asarray(response.road)
-        expected = by_events(car, own, heights, dt, delay, lag, sensor_lag, round(PERIOD / dt))
+        expected = by_events(car, own, heights, dt, delay, lag, sensor_lag, round(PERIOD / dt), limits)
         rates = np.asarray(response.motion)[:, expected.shape[1] :]
         errors.append(np.abs(rates - expected).max() / np.abs(expected).max())
     return errors
@@ -129,6 +137,16 @@ def test_a_controlled_car_is_that_of_an_event_by_event_simulation(car, name, del
     coarse, fine = largest_errors(car, name, [1e-3, 0.5e-3], delay, lag, sensor_lag)
     assert fine < 1e-5
     assert coarse / fine > 6.5  # third order: 8
+
+
+def test_a_limited_rate_is_that_of_an_event_by_event_simulation():
+    coarse, fine = largest_errors(QUARTER, "skyhook", [1e-3, 0.5e-3], 3e-3, 4e-3, limits=(-30.0, 15.0))
+    assert fine < 1e-5
+    assert coarse / fine > 6.5
+    unlimited, never = (
+        largest_errors(QUARTER, "skyhook", [1e-3], 3e-3, 4e-3, limits=one)[0] for one in (None, (-1e4, 1e4))
+    )
+    assert never == pytest.approx(unlimited, rel=1e-6)
 
 
 @pytest.mark.slow

@@ -77,7 +77,7 @@ def test_every_guess_is_a_law_near_its_data(kind, low):
     v = np.linspace(low, 1.0, 300)
     force = np.where(v > 0, 2500.0, 1200.0) * np.tanh(v)
     law = kind.guess(v, force)
-    found = np.asarray(jax.vmap(law.force_velocity)(jnp.asarray(v)))
+    found = np.asarray(jax.jit(jax.vmap(law.force_velocity))(jnp.asarray(v)))
     assert np.sqrt(np.mean((found - force) ** 2)) < (0.7 if kind is CoulombFriction else 0.35) * np.abs(force).max()
 
 

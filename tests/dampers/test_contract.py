@@ -1,5 +1,6 @@
 """Every law satisfies the contract."""
 
+import dataclasses
 import inspect
 
 import jax
@@ -51,6 +52,7 @@ from jaxdamp.dampers import (
     StrokeDependent,
     Table,
     TemperatureScaled,
+    TwinTube,
     ViscoPlastic,
 )
 from jaxdamp.testing import CHECKS, check_alike_ports, check_inside_wrappers, check_law
@@ -159,6 +161,7 @@ LAWS = {
     "play": lambda: Play(Linear(2000.0) + CoulombFriction(40.0, 0.02), 1e6, 3e-4),
     "piston flow": lambda: PistonFlow(1.42e-3, 1.6e-6, 1.2e6, 1.2e11, 2.5e-5, 5e5, 4e10, 4e-5, 2e-13),
     "mono-tube": MonoTube.reference,
+    "twin-tube": TwinTube.reference,
     "visco-plastic": lambda: ViscoPlastic(
         100.0, 900.0, 0.6, 0.02, [200.0, 300.0], [2e-3, 1e-3], [2e-4, 1e-3], [0.5, 0.1], 0.8
     ),
@@ -234,11 +237,13 @@ FURTHER = {
 }
 LONG = {
     "visco-plastic",
+    "creeping visco-plastic",
     "segmented polynomial",
     "series spring, soft cubic",
     "Karadayi and Masada",
     "play",
     "mono-tube",
+    "twin-tube",
     "modified Bouc and Wen, published",
     "neural hysteresis",
     "hybrid",
@@ -250,6 +255,7 @@ LONG = {
 EXCEPTIONS = {
     "gas spring": {"rest": "its charge pushes the rod out at rest"},
     "mono-tube": {"rest": "its charge pushes the rod out at rest"},
+    "twin-tube": {"rest": "its charge pushes the rod out at rest"},
     "lag of a network": {"passive": "a lag behind a force that springs back gives energy out"},
 }
 
@@ -321,3 +327,15 @@ def test_the_whole_contract_of_one_law_in_single_and_double_precision():
 def test_an_unknown_check_is_refused():
     with pytest.raises(ValueError, match=r"`leave_out` must be one of .*'pasive'.*'passive'"):
         check_law(Linear(1.0), leave_out=["pasive"])
+
+
+def test_a_number_in_place_of_a_law_inside_is_refused_in_words():
+    """The first look at a field is at its type, before what else a law asks of it."""
+    looked = set()
+    for law in (part for make in LAWS.values() for part in _parts(make())):
+        inside = [f.name for f in dataclasses.fields(law) if isinstance(getattr(law, f.name), AbstractDamper)]
+        for name in inside:
+            looked.add(type(law))
+            with pytest.raises(ValueError, match=rf"`{type(law).__name__}\.{name}` must be a .*, but is the number 3"):
+                dataclasses.replace(law, **{name: 3.0})
+    assert len(looked) > 10

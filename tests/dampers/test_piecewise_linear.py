@@ -1,3 +1,4 @@
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -8,6 +9,16 @@ from hypothesis.extra.numpy import arrays
 from jaxdamp.dampers import PiecewiseLinear
 
 
+@eqx.filter_jit
+def forces(law, v):
+    return jax.vmap(law.force_velocity)(v)
+
+
+@eqx.filter_jit
+def slopes_at(law, v):
+    return jax.vmap(jax.grad(law.force_velocity))(v)
+
+
 SLOPES = arrays(np.float64, 4, elements=st.floats(1.0, 1e4))
 
 
@@ -15,7 +26,7 @@ SLOPES = arrays(np.float64, 4, elements=st.floats(1.0, 1e4))
 @given(slopes=SLOPES, width=st.sampled_from([0.0, 0.005, 0.1]))
 def test_positive_slopes_make_the_force_increase(slopes, width):
     law = PiecewiseLinear([-0.3, 0.05, 0.4], slopes, width)
-    force = np.asarray(jax.vmap(law.force_velocity)(jnp.linspace(-2.0, 2.0, 401)))
+    force = np.asarray(forces(law, jnp.linspace(-2.0, 2.0, 401)))
     assert np.all(np.diff(force) > 0)
     np.testing.assert_allclose(law.force_velocity(0.0), 0.0, atol=1e-9)
 
@@ -24,14 +35,14 @@ def test_positive_slopes_make_the_force_increase(slopes, width):
 @given(slopes=SLOPES)
 def test_slopes_between_the_knots(slopes):
     law = PiecewiseLinear([-0.3, 0.05, 0.4], slopes)
-    found = jax.vmap(jax.grad(law.force_velocity))(jnp.array([-1.0, -0.1, 0.2, 1.0]))
+    found = slopes_at(law, jnp.array([-1.0, -0.1, 0.2, 1.0]))
     np.testing.assert_allclose(found, slopes, rtol=1e-9)
 
 
 def test_rounded_knees_differ_by_the_width_at_most():
     sharp, rounded = (PiecewiseLinear([-0.2, 0.2], [500.0, 2000.0, 800.0], w) for w in (0.0, 0.02))
     v = jnp.linspace(-1.0, 1.0, 501)
-    error = jax.vmap(rounded.force_velocity)(v) - jax.vmap(sharp.force_velocity)(v)
+    error = forces(rounded, v) - forces(sharp, v)
     assert np.max(np.abs(error)) <= 2 * 1500.0 * 0.02 * np.log(2)
 
 
@@ -39,7 +50,7 @@ def test_guess_fits_a_curve_with_knees():
     v = np.linspace(-1.0, 1.0, 401)
     force = np.where(np.abs(v) > 0.1, np.sign(v) * (200.0 + 800.0 * (np.abs(v) - 0.1)), 2000.0 * v)
     law = PiecewiseLinear.guess(v, force)
-    found = jax.vmap(law.force_velocity)(jnp.asarray(v))
+    found = forces(law, jnp.asarray(v))
     assert np.sqrt(np.mean((found - force) ** 2)) < 0.02 * np.abs(force).max()
 
 

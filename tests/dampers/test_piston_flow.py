@@ -98,14 +98,17 @@ def test_the_slopes_of_the_pressure_drop_are_those_of_its_formula():
         square = root * root
         return root * jnp.sqrt(0.5 * (square + jnp.sqrt(square * square + 4.0 * transition * transition)))
 
-    transition = jnp.asarray(TRANSITION)
-    for root in jnp.array([-2e3, -30.0, 0.0, 1e-3, 31.0, 1500.0]):
-        for mode in (jax.jacfwd, jax.jacrev):
-            for place in (0, 1):
-                slope, exact = mode(orifice_drop, place), mode(plain, place)
-                np.testing.assert_allclose(slope(root, transition), exact(root, transition), rtol=1e-12, atol=1e-15)
-                second = mode(slope, place)(root, transition), mode(exact, place)(root, transition)
-                np.testing.assert_allclose(*second, rtol=1e-10, atol=1e-12)
+    def slopes(function):
+        """First and second ones in both places, in both modes, at each root."""
+        ways = [(mode, place) for mode in (jax.jacfwd, jax.jacrev) for place in (0, 1)]
+        first = [mode(function, place) for mode, place in ways]
+        second = [mode(slope, place) for slope, (mode, place) in zip(first, ways, strict=True)]
+        at_one = lambda root: [jnp.stack([slope(root, TRANSITION) for slope in each]) for each in (first, second)]  # noqa: E731
+        return jax.jit(jax.vmap(at_one))(jnp.array([-2e3, -30.0, 0.0, 1e-3, 31.0, 1500.0]))
+
+    (first, second), (exact_first, exact_second) = slopes(orifice_drop), slopes(plain)
+    np.testing.assert_allclose(first, exact_first, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(second, exact_second, rtol=1e-10, atol=1e-12)
 
 
 def test_single_precision():

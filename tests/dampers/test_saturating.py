@@ -56,7 +56,7 @@ def test_guess_is_near(shape):
     law = Saturating(**NUMBERS, shape=shape)
     v = np.sin(np.linspace(0.0, 20.0, 4001))
     noise = 10.0 * np.random.default_rng(3).standard_normal(v.size)
-    start = Saturating.guess(v, np.asarray(jax.vmap(law.force_velocity)(jnp.asarray(v))) + noise, shape)
+    start = Saturating.guess(v, np.asarray(jax.jit(jax.vmap(law.force_velocity))(jnp.asarray(v))) + noise, shape)
     assert start.shape == shape
     for name, value in NUMBERS.items():
         np.testing.assert_allclose(getattr(start, name), value, rtol=0.25)

@@ -75,7 +75,7 @@ def test_the_command_reaches_laws_inside_others():
 def test_batched_over_the_command():
     law = Scheduled((bouc_wen(0.0), bouc_wen(2.0)), [0.0, 2.0], 0.0)
     u = jnp.array([0.0, 0.5, 2.0])
-    found = jax.vmap(lambda u: with_command(law, u).force(0.0, 0.3, jnp.zeros(1)))(u)
+    found = jax.jit(jax.vmap(lambda u: with_command(law, u).force(0.0, 0.3, jnp.zeros(1))))(u)
     np.testing.assert_allclose(found, (400.0 + 300.0 * u) * 0.3)
 
 

@@ -30,14 +30,14 @@ def test_the_force_falls_with_velocity():
 @pytest.mark.parametrize(("ratio", "share"), [(0.05, 0.98), (0.1, 0.96), (0.3, 0.83)])
 def test_peak_that_is_left(ratio, share):
     law = StribeckFriction(40.0, 80.0, 0.02, 0.02 * ratio)
-    peak = np.max(jax.vmap(law.force_velocity)(jnp.linspace(0.0, 0.05, 2001)))
+    peak = np.max(jax.jit(jax.vmap(law.force_velocity))(jnp.linspace(0.0, 0.05, 2001)))
     np.testing.assert_allclose(peak / 80.0, share, atol=0.005)
 
 
 def test_equal_levels_are_coulomb_friction():
     v = jnp.linspace(-0.1, 0.1, 201)
-    found = jax.vmap(StribeckFriction(40.0, 40.0, 0.02, 2e-3).force_velocity)(v)
-    np.testing.assert_allclose(found, jax.vmap(CoulombFriction(40.0, 2e-3).force_velocity)(v), rtol=1e-13)
+    found = jax.jit(jax.vmap(StribeckFriction(40.0, 40.0, 0.02, 2e-3).force_velocity))(v)
+    np.testing.assert_allclose(found, jax.jit(jax.vmap(CoulombFriction(40.0, 2e-3).force_velocity))(v), rtol=1e-13)
 
 
 def test_work_of_a_fast_cycle():

@@ -12,7 +12,7 @@ FORCE = [-1400.0, -800.0, -450.0, 10.0, 300.0, 1500.0, 2900.0]
 
 def test_straight_lines_between_the_points():
     v = np.linspace(-1.1, 1.0, 211)
-    found = jax.vmap(Table(VELOCITY, FORCE).force_velocity)(jnp.asarray(v))
+    found = jax.jit(jax.vmap(Table(VELOCITY, FORCE).force_velocity))(jnp.asarray(v))
     np.testing.assert_allclose(found, np.interp(v, VELOCITY, FORCE), rtol=1e-11, atol=1e-9)
 
 
@@ -29,7 +29,7 @@ def test_two_points_are_a_line():
 def test_guess_goes_through_its_data():
     v = np.linspace(-1.0, 1.0, 801)
     force = 900.0 * np.tanh(4.0 * v) + 500.0 * v
-    found = jax.vmap(Table.guess(v, force, points_a_side=10).force_velocity)(jnp.asarray(v))
+    found = jax.jit(jax.vmap(Table.guess(v, force, points_a_side=10).force_velocity))(jnp.asarray(v))
     assert np.max(np.abs(found - force)) < 10.0
 
 

@@ -2,12 +2,13 @@
 
 import itertools
 import json
+import re
 
 import jax
 import numpy as np
 import pytest
 
-from jaxdamp import Ride, respond, simulate
+from jaxdamp import Ride, plots, respond, simulate
 from jaxdamp._types import Number
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import (
@@ -57,7 +58,7 @@ def cells(browser, side=0):
 
 
 def number(browser, path):
-    return float(browser.evaluate(f"document.querySelector('[data-path=\"{path}\"]').value"))
+    return float(browser.evaluate(f"document.querySelector('[data-path=\"{path}\"]').dataset.value"))
 
 
 def is_ride(shown, vehicle, road, **options):
@@ -214,9 +215,9 @@ def test_the_saved_law_is_read_back_exactly(tmp_path, browser):
     expected = with_command(replace(law, {"terms.0.law.laws.1.slopes": slopes}), 0.625)
     assert json.loads(to_json(changed)) == json.loads(to_json(expected))
     browser.type(f'[data-path="{slope}"]', "-1")
-    assert number(browser, slope) == -1.0 and json.loads(browser.evaluate("lawDocument()")) == json.loads(
-        saved.read_text()
-    )
+    typed = browser.evaluate(f"document.querySelector('[data-path=\"{slope}\"]').value")
+    assert typed == "-1" and number(browser, slope) == 1234.5678901234567  # what counts stays
+    assert json.loads(browser.evaluate("lawDocument()")) == json.loads(saved.read_text())
     assert "must be" in browser.evaluate("document.querySelector('.control .error:not(:empty)').textContent")
     assert not browser.troubles()
 
@@ -254,3 +255,26 @@ def test_refusals(tmp_path):
 @pytest.mark.parametrize("name", ["series spring, sum", "LuGre", "mono-tube", "neural hysteresis", "stroke table"])
 def test_laws_of_all_kinds_have_a_page(tmp_path, name):
     page(LAWS[name](), tmp_path, duration=0.5)
+
+
+@pytest.mark.slow
+def test_it_speaks_the_words_and_has_the_colours_of_the_pictures(tmp_path, browser):
+    law = Lag(Besinger(878.877123, 2804.4567, 700.0, 0.091589123, 0.05), 1.5e-3)
+    file = page(law, tmp_path, browser)
+    assert browser.evaluate("document.querySelector('h1').textContent") == "Besinger + lag"
+    words = browser.evaluate("document.body.innerText")
+    assert "in a quarter car" in words and "body acceleration, weighted RMS" in words
+    assert not re.search(r"[a-z]_[a-z]|QuarterCar", words)
+    boxes = browser.evaluate("[...document.querySelectorAll('input[data-path]')].map((box) => box.value)")
+    assert "878.9" in boxes and "0.09159" in boxes and number(browser, "law.compression_rate") == 878.877123
+    seen = "['law', 'baseline', 'measured', 'bad', 'curve0', 'curve1', 'curve2', 'curve3'].map((name) => colour(name))"
+    roles = [plots.ROLES[name]["color"] for name in ("after", "before", "measured", "limit")]
+    palette = re.findall("#[0-9A-F]{6}", plots.STYLE["axes.prop_cycle"])[:4]
+    assert [each.upper() for each in browser.evaluate(seen)] == [each.upper() for each in (*roles, *palette)]
+    browser.open(file, width=390, height=844)
+    assert browser.evaluate("document.documentElement.scrollWidth") <= 390
+    browser.call("Emulation.setEmulatedMedia", media="print")
+    whole = "(() => { const list = document.querySelector('aside'); return list.scrollHeight - list.clientHeight; })()"
+    assert browser.evaluate(whole) <= 1  # nothing of it in a scroll box
+    assert browser.evaluate("getComputedStyle(document.querySelector('.buttons')).display") == "none"
+    browser.call("Emulation.setEmulatedMedia", media="")

@@ -331,3 +331,15 @@ def test_a_range_in_a_file_of_the_first_version_is_refused():
     document = json.loads(to_json(with_fitted_range(Linear(1500.0), velocity=(-0.5, 0.5))))
     with pytest.raises(ValueError, match="have no 'fitted_to' in version 1"):
         from_json(json.dumps(document | {"version": 1}))
+
+
+def test_classes_of_the_package_have_names_of_their_own():
+    """By which a file finds them: two of one name could not be written."""
+    modules, waiting = list[type[eqx.Module]](), [eqx.Module]
+    while waiting:
+        waiting += (found := waiting.pop().__subclasses__())
+        modules += [c for c in found if c.__module__.startswith("jaxdamp.") and not inspect.isabstract(c)]
+    homes: dict[str, set[str]] = {}
+    for own in modules:
+        homes.setdefault(own.__name__, set()).add(own.__module__)
+    assert not {name: places for name, places in homes.items() if len(places) > 1 and not name.startswith("_")}

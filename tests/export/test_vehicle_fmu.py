@@ -103,7 +103,9 @@ class Unit:
     def __init__(self, file, folder, inputs, kind=None, **numbers):
         self.description = fmpy.read_model_description(str(file))
         self.at, self.inputs = {v.name: v.valueReference for v in self.description.modelVariables}, inputs
-        unzipped = fmpy.extract(str(file), unzipdir=str(folder / file.stem))
+        unzipped = str(folder / file.stem)
+        if not (folder / file.stem).exists():  # units of one binary share it
+            fmpy.extract(str(file), unzipdir=unzipped)
         about = {"unzipDirectory": unzipped, "modelIdentifier": file.stem, "instanceName": "one"}
         self.fmu = (kind or fmpy.fmi2.FMU2Slave)(guid=self.description.guid, **about)
         self.fmu.instantiate()

@@ -35,7 +35,7 @@ def test_the_residual_of_a_problem_gives_the_truth_within_bounds_where_a_start_a
         lambda y, _: problem.residual(coordinates.to_physical(y)), solver, jnp.asarray(coordinates.start)
     )
     np.testing.assert_allclose(coordinates.to_physical(found.value), [1500.0, 0.004], rtol=2e-3)
-    forward, reverse = (of(problem.residual)(problem.free.values) for of in (jax.jacfwd, jax.jacrev))
+    forward, reverse = (jax.jit(of(problem.residual))(problem.free.values) for of in (jax.jacfwd, jax.jacrev))
     np.testing.assert_allclose(forward, reverse, rtol=1e-8, atol=1e-12)
 
     def at_rest(values, _):

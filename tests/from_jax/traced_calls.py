@@ -198,6 +198,7 @@ SAMPLES: dict[str, dict[str, list[Call]]] = {
             lambda f, x: f(lambda law: {"a": law.force_velocity(1.0)}, Linear(1500.0), {"a": (x, 1.0)}),
         ],
         "fit_vehicle": [lambda f, x: f(car(x), [])],
+        "friction_ladder": [lambda f, x: f(car(x))],
         "predict_runs": [lambda f, x: f(law(x), [RUN])],
         "prepare": [
             lambda f, x: f(law(x), [RUN]),

@@ -22,7 +22,7 @@ def record(name, law, state, amplitude=0.005, rest=2.5, noise=1.0):
     time = np.arange(0.0, 4.5, 5e-3)
     phase = 8.0 * np.maximum(time - rest, 0.0)
     stroke, velocity = amplitude * (1.0 - np.cos(phase)), 8.0 * amplitude * np.sin(phase)
-    of_law = march(law, jnp.asarray(5e-3), jnp.asarray(stroke), jnp.asarray(velocity), 1, None, jnp.asarray(state))
+    of_law = march(law, jnp.asarray(5e-3), jnp.asarray(stroke), jnp.asarray(velocity), 1, state=jnp.asarray(state))
     force = np.asarray(of_law) + noise * np.random.default_rng(len(name)).standard_normal(time.size)
     return BenchRun(name, time, stroke, velocity, force)
 

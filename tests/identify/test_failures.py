@@ -50,7 +50,7 @@ def test_laws_side_by_side_have_the_precision_of_their_caller(sines):
 def test_a_comparison_without_any_fit_says_why(sines):
     with pytest.raises(ValueError, match=r"None of 2 laws could be fitted\. a: no velocity b: too stiff"):
         compare({"a": _no_start, "b": _overflow}, sines(TRUTH, noise=5.0))
-    with pytest.raises(ValueError, match=r"None of 1 laws could be fitted\. Argument `weighting` must be one of"):
+    with pytest.raises(ValueError, match=r"The law linear could not be fitted\. Argument `weighting` must be one of"):
         compare({"linear": Linear}, sines(TRUTH, noise=5.0), weighting="records")
     with pytest.raises(TypeError):
         compare({"linear": Linear, "bilinear": Bilinear}, sines(TRUTH, noise=5.0), wieghting="runs")

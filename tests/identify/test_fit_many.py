@@ -217,4 +217,4 @@ def test_one_damper_of_many_has_everything_that_a_single_fit_has(clicks):
     single = many.fit("10", input_noise=(1e-5, 1e-3))
     np.testing.assert_allclose(many.values[5], [e.value for e in single.parameters], rtol=1e-3)
     assert single["rebound_rate"].bias is not None
-    assert single.profile("law.rebound_rate").interval[0] < single["rebound_rate"].value
+    assert single.profile("rebound_rate").interval[0] < single["rebound_rate"].value

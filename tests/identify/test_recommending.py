@@ -12,7 +12,7 @@ from jaxdamp.identify import compare, cross_validate
 from jaxdamp.identify.held_out import motions
 from jaxdamp.identify.model import is_memoryless
 from jaxdamp.identify.predicting import used_samples
-from jaxdamp.identify.rungs import recommendation
+from jaxdamp.identify.recommending import recommendation
 
 
 TRUTH = Bilinear(2600.0, 1200.0)
@@ -72,6 +72,8 @@ def test_a_law_with_doubtful_numbers_is_left_aside_where_another_is_as_good(comp
     bilinear, curve = rungs["bilinear"], rungs["piecewise_linear"]
     weak = [e._replace(note="not identifiable") for e in bilinear.result.parameters]
     doubted = bilinear._replace(result=dataclasses.replace(bilinear.result, parameters=tuple(weak)))
+    sure = tuple(e._replace(note="") for e in curve.result.parameters)  # but for its needless knots
+    curve = curve._replace(result=dataclasses.replace(curve.result, parameters=sure))
     choice = recommendation([rungs["linear"], doubted, curve])
     assert choice.rung is curve and choice.doubted == (doubted,)
     assert recommendation([rungs["linear"], doubted]).rung is doubted  # no other is nearly as good

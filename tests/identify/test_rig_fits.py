@@ -14,6 +14,7 @@ from jaxdamp.dampers import (
     Bilinear,
     BoucWen,
     CoulombFriction,
+    Lag,
     Linear,
     SeriesSpring,
     Spring,
@@ -238,3 +239,19 @@ def test_friction_of_law_and_machine_are_one():
     assert found.steps == 0
     assert abs(found["rig.friction"].value - 30.0) < 3 * found["rig.friction"].standard_error
     assert isinstance(runs[0], BenchRun)
+
+
+def test_a_pattern_with_another_meaning_beside_a_machine_is_refused() -> None:
+    """Paths of a law begin with "law." beside a machine, and those of a law in a wrapper by themselves."""
+    law, runs = Lag(LAW, 0.005), records(tests=TESTS[:1])
+    assert identify.prepare(law, runs, freeze=["law.*"]).free.names == ["lag_time"]
+    refused = r"`freeze` .* 'law\.\*'.*law\.law\.rebound_rate, .* of the law, but law\.lag_time beside a machine"
+    with pytest.raises(ValueError, match=refused):
+        identify.prepare(law, runs, rig="offset", freeze=["law.*"])
+    with pytest.raises(ValueError, match="`over`"):
+        identify.prepare(law, runs, rig="offset", over="law.*")
+    clear = {"law.law.*": ["law.lag_time"], "law.lag_time": ["law.law.rebound_rate", "law.law.compression_rate"]}
+    for pattern, left in clear.items():
+        free = identify.prepare(law, runs, rig="offset", freeze=[pattern]).free
+        assert free.names == [*left, "rig.force_offset"]
+    assert identify.prepare(LAW, runs, rig="offset", freeze=["law.*"]).free.names == ["rig.force_offset"]

@@ -74,7 +74,7 @@ def test_an_optimum_at_zero_is_reached_and_said(sines):
     # the offset counts as unknown in the error of the force: that of least squares over the columns of all parameters
     free = free_parameters(result.law)
     velocity = np.concatenate([run.velocity for run in runs])
-    columns = jax.jacfwd(lambda values: jax.vmap(free.build(values).force_velocity)(velocity))(free.values)
+    columns = jax.jit(jax.jacfwd(lambda values: jax.vmap(free.build(values).force_velocity)(velocity)))(free.values)
     expected = result.rmse * np.sqrt(np.diag(np.linalg.inv(np.asarray(columns.T @ columns))))
     assert np.allclose(np.sqrt(np.diag(result.covariance)), expected, rtol=5e-3)
     assert np.all(np.array([e.standard_error for e in result.parameters]) >= 0.99 * expected)

@@ -124,3 +124,14 @@ def test_the_error_of_a_law_that_is_wrong_includes_what_it_misses():
     assert "with what the law misses" in str(wrong.parameters_table())
     assert wrong.to_dict()["parameters"][0]["spread"] == pytest.approx(rate.spread)
     assert all(e.spread is None for e in right.parameters)
+
+
+def test_a_knot_between_equal_slopes_is_not_identifiable(sines):
+    """Its place hardly matters: the records determine a curve without it."""
+    truth = PiecewiseLinear([0.12], [1600.0, 900.0])
+    start = PiecewiseLinear([-0.15, 0.1, 0.3], [1500.0, 1550.0, 1000.0, 950.0])
+    result = fit(start, sines(truth, noise=5.0, seed=2), starts=1)
+    notes = [e.note for e in result.parameters if "knots" in e.name]
+    assert notes == ["not identifiable", "", "not identifiable"]
+    told = [warning for warning in result.warnings if warning.startswith("knots[2] is not identifiable")]
+    assert len(told) == 1 and told[0].endswith("the curve hardly bends there. Take one with fewer knots.")

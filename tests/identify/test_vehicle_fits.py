@@ -3,12 +3,18 @@
 import dataclasses
 import re
 
+import jax
 import numpy as np
 import pytest
 
 from jaxdamp import bench, identify, roads
 from jaxdamp.dampers import Bilinear, CoulombFriction, Linear
-from jaxdamp.parameters import replace
+from jaxdamp.identify import vehicle_residuals
+from jaxdamp.identify.model import VehicleTest
+from jaxdamp.identify.problem import linearised
+from jaxdamp.identify.vehicle_preparing import drives_of
+from jaxdamp.identify.vehicle_residuals import ride_batches
+from jaxdamp.parameters import free_parameters, parameters, replace
 from jaxdamp.rig import Rig, Sensor
 from jaxdamp.vehicles import Guide, Guided, QuarterCar
 
@@ -237,3 +243,38 @@ def test_a_reversed_channel_is_named(record, reversed_channel):
     assert re.search(
         r"of sweep runs against the (fitted vehicle|vehicle of the start) \(correlation -0", " ".join(result.warnings)
     )
+
+
+def test_numbers_of_sensors_need_no_tangents_through_the_vehicle(record):
+    """The columns of sensors are derivatives of what the simulation gave, and those of the vehicle do not change."""
+    sensors = {"stroke": Sensor(offset=1e-3, gain=1.1), "sprung_acceleration": Sensor(offset=0.1, lag=2e-3)}
+    model = VehicleTest(CAR, sensors)
+    (part,) = ride_batches((record,), drives_of(CAR, (record,), 2e-3), NOISE)
+    held = [f"sensors.{name}.{p.path}" for name, s in sensors.items() for p in parameters(s) if p.path not in s.given]
+    free = free_parameters(model, over=["sensors.**", "damper.rate", "spring_rate"], freeze=held)
+    widths = list[int]()
+
+    def noted(tangent):
+        widths.append(1 if tangent.ndim == 1 else len(tangent))
+        return tangent
+
+    @jax.custom_jvp
+    def counted(values):
+        return values
+
+    @counted.defjvp
+    def _(values, tangents):
+        kind = jax.ShapeDtypeStruct(tangents[0].shape, tangents[0].dtype)
+        return values[0], jax.pure_callback(noted, kind, tangents[0], vmap_method="expand_dims")
+
+    settled = vehicle_residuals.settled
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(vehicle_residuals, "settled", lambda system, heights: counted(settled(system, heights)))
+        residual, jacobian = linearised(free, free.values, (part,))
+    assert widths == [2]  # the rates of the vehicle, none of the numbers of its sensors
+    for i, (name, value) in enumerate(zip(free.names, np.asarray(free.values), strict=True)):
+        step = 1e-4 * max(abs(float(value)), 1e-2)
+        ends = [part(free.build(free.values.at[i].set(value + side * step))) for side in (-1.0, 1.0)]
+        slope = np.asarray(ends[1] - ends[0]) / (2.0 * step)
+        assert np.linalg.norm(slope - jacobian[:, i]) < 1e-5 * np.linalg.norm(slope), name
+    np.testing.assert_allclose(residual, part(model), rtol=1e-9, atol=1e-9)

@@ -36,7 +36,7 @@ def test_settling_at_the_edges():
     assert float(settling_time(np.ones(9), 0.1)) == np.inf
     assert float(settling_time(np.array([1.0, 0.0]), 0.1)) == pytest.approx(0.095)
     assert np.isnan(settling_time(np.array([1.0, np.nan, 0.0]), 0.1))
-    gradient = jax.grad(lambda x: settling_time(x, 0.1))(jnp.zeros(9))
+    gradient = jax.jit(jax.grad(lambda x: settling_time(x, 0.1)))(jnp.zeros(9))
     assert np.all(np.isfinite(gradient))
 
 
@@ -97,7 +97,7 @@ def test_without_turning_points_there_is_no_decrement():
 
 
 def test_damping_ratio_gradient():
-    zeta = jax.grad(damping_ratio)(0.0)
+    zeta = jax.jit(jax.grad(damping_ratio))(0.0)
     assert float(zeta) == pytest.approx(1 / (2 * np.pi), rel=1e-12)
 
 

@@ -56,10 +56,12 @@ def test_power_is_energy_per_time(rng):
 
 
 def test_gradients():
-    rate = jax.grad(lambda c: dissipated_energy(c * jnp.asarray(V), V, DT))(1800.0)
+    rate = jax.jit(jax.grad(lambda c: dissipated_energy(c * jnp.asarray(V), V, DT)))(1800.0)
     assert float(rate) == pytest.approx(CYCLES * np.pi * OMEGA * STROKE**2, rel=1e-12)
-    assert float(jax.grad(lambda c: equivalent_damping(c * jnp.asarray(V), V))(1800.0)) == pytest.approx(1.0, rel=1e-12)
-    power = jax.grad(lambda dt: dissipated_energy(1800.0 * V, V, dt))(DT)
+    assert float(jax.jit(jax.grad(lambda c: equivalent_damping(c * jnp.asarray(V), V)))(1800.0)) == pytest.approx(
+        1.0, rel=1e-12
+    )
+    power = jax.jit(jax.grad(lambda dt: dissipated_energy(1800.0 * V, V, dt)))(DT)
     assert float(power) == pytest.approx(float(dissipated_energy(1800.0 * V, V, 1.0)), rel=1e-12)
 
 

@@ -66,12 +66,12 @@ def test_gradient_of_the_variance(noise):
         return jnp.sum(psd) * frequency[1]
 
     x = jnp.asarray(noise[:1000])
-    np.testing.assert_allclose(jax.grad(variance)(x), 2 * (x - x.mean()) / 1000, atol=1e-14)
+    np.testing.assert_allclose(jax.jit(jax.grad(variance))(x), 2 * (x - x.mean()) / 1000, atol=1e-14)
 
 
 def test_density_is_proportional_to_the_interval(noise):
     x = jnp.asarray(noise)
-    slope = jax.grad(lambda dt: power_spectral_density(x, dt, 512)[1][7])(0.002)
+    slope = jax.jit(jax.grad(lambda dt: power_spectral_density(x, dt, 512)[1][7]))(0.002)
     assert float(slope) == pytest.approx(float(power_spectral_density(x, 1.0, 512)[1][7]), rel=1e-12)
 
 

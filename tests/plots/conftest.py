@@ -1,11 +1,22 @@
+import numpy as np
 import pytest
+import xarray
+from matplotlib.figure import Figure
 
-from jaxdamp import bench, identify, roads, simulate, tune, vehicles
+from jaxdamp import bench, identify, plots, roads, simulate, tune, vehicles
+from jaxdamp._status import Status
 from jaxdamp.bench import BenchSet, SineTest
-from jaxdamp.dampers import Bilinear, Lag
-from jaxdamp.identify import Comparison
+from jaxdamp.dampers import Bilinear, BoucWen, Lag
+from jaxdamp.identify import Comparison, CrossValidation
+from jaxdamp.identify.cross_validation import Fold
+from jaxdamp.parameters import free_parameters
 from jaxdamp.simulation import Response
-from jaxdamp.tune import TuneResult
+from jaxdamp.tune import ParetoFront, TuneResult
+from jaxdamp.tune.front import FrontParameter
+from jaxdamp.tune.measuring import Measurement
+
+
+COMFORT, GRIP = "weighted_rms_sprung_acceleration", "rms_dynamic_tyre_load"
 
 
 @pytest.fixture(scope="session")
@@ -42,3 +53,80 @@ def tuned() -> TuneResult:
         duration=2.0,
         dt=0.005,
     )
+
+
+@pytest.fixture(scope="session")
+def validation() -> CrossValidation:
+    """Of stored numbers."""
+    scores = {"linear": (61.0, 70.0, 74.0), "besinger_lag": (93.0, 97.0, 96.0)}
+    return CrossValidation(
+        tuple(
+            Fold(law, "fast" if number else "slow", f"{number}Hz", percent, 100.0 - percent, None)
+            for law, percents in scores.items()
+            for number, percent in enumerate(percents)
+        )
+    )
+
+
+@pytest.fixture(scope="session")
+def swept() -> xarray.Dataset:
+    """A map of stored numbers, with its least value within."""
+    rate, spring = np.linspace(500.0, 3000.0, 11), np.linspace(10e3, 30e3, 9)
+    comfort = 0.7 + 1e-7 * (rate[:, None] - 1300.0) ** 2 + 2e-9 * (spring - 16e3) ** 2
+    grip = 400.0 + 2e-4 * (rate[:, None] - 2100.0) ** 2 + 0.004 * spring
+    axes = ("damper.rate", "spring_rate")
+    data = {COMFORT: (axes, comfort, {"units": "m/s^2"}), GRIP: (axes, grip, {"units": "N"})}
+    coordinates = {axes[0]: (axes[0], rate, {"units": "N s/m"}), axes[1]: (axes[1], spring, {"units": "N/m"})}
+    return xarray.Dataset(data, coordinates | {"failed": (axes, np.zeros(comfort.shape, bool))})
+
+
+@pytest.fixture(scope="session")
+def front() -> ParetoFront:
+    """Of stored numbers: more damping, less tyre load, less comfort."""
+    car = vehicles.presets.quarter_car_000(Bilinear(1500.0, 1500.0))
+    share = np.linspace(0.0, 1.0, 9)
+    values = {COMFORT: 0.8 + 0.5 * share**2, GRIP: 700.0 - 250.0 * share**0.5}
+    rates = np.stack([1000.0 + 3000.0 * share, 800.0 + 1500.0 * share], axis=1)
+    over = ["damper.rebound_rate", "damper.compression_rate"]
+    return ParetoFront(
+        start=car, names=(COMFORT, GRIP), values=values, before={COMFORT: 1.15, GRIP: 640.0},
+        units={COMFORT: "m/s^2", GRIP: "N"},
+        parameters=tuple(FrontParameter(name, "N s/m", 1500.0, 100.0, 5000.0) for name in over),
+        designs=rates, limits={GRIP: 650.0}, reference={COMFORT: 1.4, GRIP: 800.0}, warnings=(),
+        status=Status.CONVERGED, evaluations=9, interpolated=0, dropped=0,
+        free=free_parameters(car, over=over), measured=object.__new__(Measurement), fresh={},
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def figures(
+    runs: BenchSet,
+    comparison: Comparison,
+    responses: dict[str, Response],
+    tuned: TuneResult,
+    validation: CrossValidation,
+    swept: xarray.Dataset,
+    front: ParetoFront,
+) -> dict[str, Figure]:
+    """The pictures by which people judge: what the house style and the golden pictures are tested with."""
+    evaluation, best = bench.evaluate(runs), comparison.best.result
+    return {
+        "damper sheet": comparison.plot("sheet", evaluation=evaluation),
+        "bench sheet": evaluation.plot("sheet"),
+        "ride sheet": plots.ride_sheet(responses),
+        "tuning sheet": tuned.plot("sheet"),
+        "one ride": responses["soft"].plot("sheet"),
+        "ladder": comparison.plot(),
+        "errors of held-out records": validation.plot(),
+        "loops": best.plot(),
+        "cycles": evaluation.plot(),
+        "ride": plots.ride(responses, weighting="Wk"),
+        "damper use": plots.damper_use(responses),
+        "tuning": tuned.plot(),
+        "curves": plots.force_velocity(
+            {"besinger_lag": best.law, "bilinear": Bilinear(2000.0, 1500.0)}, runs=list(runs), baseline="bilinear"
+        ),
+        "law card": plots.law_card(BoucWen(800.0, 2000.0, 300.0, 2e-3), frequencies=(1.0, 4.0)),
+        "sweep map": plots.sweep(swept, COMFORT, limits={GRIP: 640.0}),
+        "front": plots.pareto(front),
+    }

@@ -24,7 +24,8 @@ def test_lines_are_the_measured_and_the_fitted_last_steady_cycle(runs: BenchSet,
     result, run = comparison["bilinear"], runs[3]
     figure = plots.fit_loops(result, run)
     loops, football, over_velocity, over_time = figure.axes
-    part = last_steady_cycle(run)
+    part = np.arange(len(run))[last_steady_cycle(run)]
+    part = np.append(part, part[0])  # closed
     fitted = result.respond(run)
     measured_line, fitted_line = loops.get_lines()[:2]
     np.testing.assert_array_equal(measured_line.get_xydata(), np.stack([run.velocity[part], run.force[part]], axis=1))
@@ -33,9 +34,10 @@ def test_lines_are_the_measured_and_the_fitted_last_steady_cycle(runs: BenchSet,
     np.testing.assert_array_equal(football.get_lines()[1].get_ydata(), fitted[part])
     residual = fitted[part] - run.force[part]
     np.testing.assert_array_equal(over_velocity.get_lines()[0].get_ydata(), residual)
-    np.testing.assert_array_equal(over_time.get_lines()[0].get_ydata(), residual)
+    means = residual[: (len(part) - 1) // (size := (len(part) - 1) // 40) * size].reshape(-1, size).mean(axis=1)
+    np.testing.assert_allclose(np.asarray(over_time.get_lines()[0].get_ydata()), means)
     phase = np.asarray(over_time.get_lines()[0].get_xdata())
-    assert phase[0] == 0.0 and phase[-1] == pytest.approx(1.0, abs=0.02)
+    assert phase[0] == pytest.approx(0.0, abs=0.02) and phase[-1] == pytest.approx(1.0, abs=0.05)
 
 
 def test_the_residual_of_a_slow_record_is_drawn_in_means_over_the_cycle(comparison: Comparison) -> None:
@@ -46,11 +48,11 @@ def test_the_residual_of_a_slow_record_is_drawn_in_means_over_the_cycle(comparis
         0.01 * np.sin(2 * np.pi * np.arange(8000) / 2000),
         np.random.default_rng(0).normal(size=8000),
     )
-    part, every = last_steady_cycle(slow), 6
+    part, every = last_steady_cycle(slow), 50
     residual = result.respond(slow)[part] - slow.force[part]
     over_time = np.asarray(plots.fit_loops(result, slow).axes[3].get_lines()[0].get_ydata())
-    assert len(over_time) == len(residual) // every
-    assert over_time[5] == pytest.approx(residual[30:36].mean())
+    assert len(over_time) == len(residual) // every == 40
+    assert over_time[5] == pytest.approx(residual[250:300].mean())
 
 
 def test_of_many_records_some_are_shown_and_the_title_says_so(runs: BenchSet, comparison: Comparison) -> None:

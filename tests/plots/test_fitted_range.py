@@ -17,6 +17,12 @@ FITTED = with_fitted_range(Bilinear(2600.0, 1200.0), velocity=(-0.1, 0.2))
 VELOCITY = np.linspace(-0.5, 0.5, 101)
 
 
+def _legend(axes: Axes) -> list[str]:
+    legend = axes.get_legend()
+    assert legend is not None
+    return [text.get_text() for text in legend.get_texts()]
+
+
 def _shaded(axes: Axes, along: int = 0) -> list[tuple[float, float]]:
     """Lower and upper end of each shaded span, over x (0) or over y (1)."""
     boxes: list[Any] = [
@@ -42,14 +48,14 @@ def test_a_curve_is_dotted_and_shaded_beyond_the_records() -> None:
     (dotted,) = [line for line in axes.get_lines() if line.get_linestyle() == ":"]
     assert dotted.get_color() == solid.get_color() and dotted.get_alpha() == pytest.approx(0.6)
     np.testing.assert_allclose(_shaded(axes), [(-0.5, -0.1), (0.2, 0.5)], atol=1e-9)
-    assert LABEL in [text.get_text() for text in figure.legends[0].get_texts()]
+    assert _legend(axes) == [LABEL]
 
 
 def test_a_law_without_a_range_or_within_it_is_drawn_as_ever() -> None:
     for law in (Linear(500.0), with_fitted_range(Linear(500.0), velocity=(-0.5, 0.5))):
         figure = plots.force_velocity({"law": law}, VELOCITY)
         assert not _shaded(figure.axes[0])
-        assert [text.get_text() for text in figure.legends[0].get_texts()] == ["law"]
+        assert _legend(figure.axes[0]) == ["law"]
 
 
 def test_only_what_lies_beyond_all_records_is_shaded() -> None:

@@ -1,3 +1,4 @@
+import re
 import subprocess
 import sys
 
@@ -26,7 +27,8 @@ def _line(axes: Axes, label: str) -> np.ndarray:
 
 
 def _legend(figure: Figure) -> list[str]:
-    return [text.get_text() for text in figure.legends[0].get_texts()]
+    legends = [*figure.legends, *(legend for axes in figure.axes if (legend := axes.get_legend()) is not None)]
+    return [text.get_text() for text in legends[0].get_texts()]
 
 
 # ---- force_velocity
@@ -43,7 +45,9 @@ def test_force_velocity_draws_each_law_where_asked() -> None:
         "velocity [m/s]   (+ rebound, − compression)",
         "force [N]   (+ resists extension)",
     )
-    assert _legend(figure) == ["a", "b"]
+    labels = {text.get_text(): text.get_color() for text in axes.texts}  # at the ends of the curves, in their colours
+    assert labels == {line.get_label(): line.get_color() for line in axes.get_lines()[:2]}
+    assert set(labels) == {"a", "b"} and axes.get_legend() is None
 
 
 def test_a_law_with_states_is_drawn_settled() -> None:
@@ -115,14 +119,17 @@ def test_ladder_has_a_bar_for_each_error(comparison: Comparison) -> None:
     fitted = [rung.rmse for rung in rungs]
     held_out = [rung.held_out_rmse for rung in rungs]
     assert widths == pytest.approx([*fitted, *held_out])
-    assert axes.get_xlabel().startswith("RMS of the force error [N]")
+    assert axes.get_xlabel().startswith("RMSE of the force [N]")
     assert [label.get_text() for label in axes.get_yticklabels()] == [
         "bilinear (3)",
         "linear (2)",
     ]  # each with an offset
     bold = [label.get_text() for label in axes.get_yticklabels() if label.get_fontweight() == "bold"]
     assert bold == [f"{comparison.best.name} ({comparison.best.parameters})"]
-    assert _legend(figure) == ["fitted records", "held-out records"]
+    *bars, noise = _legend(figure)
+    assert bars == ["fitted records", "held-out records"] and re.fullmatch(r"noise of the force, [\d.]+ N", noise)
+    (line,) = axes.get_lines()
+    assert float(np.asarray(line.get_xdata())[0]) == pytest.approx(5.0, rel=0.2)  # of the virtual sensor
 
 
 # ---- ride
@@ -186,10 +193,10 @@ def test_other_channels_get_a_label_with_their_unit(responses: dict[str, Respons
 # ---- tuning
 
 
-def test_tuning_draws_laws_metrics_and_search(tuned: TuneResult) -> None:
+def test_tuning_draws_laws_and_metrics(tuned: TuneResult) -> None:
     velocity = np.linspace(-0.3, 0.3, 7)
     figure = plots.tuning(tuned, velocity)
-    curves, bars, search, *spectra = figure.axes
+    bars, *spectra, curves = figure.axes
     assert len(spectra) == 3 and "body acceleration" in spectra[0].get_title(loc="left")
     after = tuned.parameters[0].after
     np.testing.assert_allclose(_line(curves, "before")[:, 1], 2500.0 * velocity, atol=1e-9)
@@ -200,9 +207,6 @@ def test_tuning_draws_laws_metrics_and_search(tuned: TuneResult) -> None:
     names = [label.get_text() for label in bars.get_yticklabels()]
     assert "body acceleration, RMS (minimised)" in names and "suspension travel, peak–peak (limited)" in names
     assert bars.get_xlabel() == "change [%]"
-    history = np.asarray(search.get_lines()[0].get_ydata())
-    np.testing.assert_allclose(history, [tuned.before[tuned.metric], *tuned.history])
-    assert search.get_ylabel() == "metric [m/s²]"
 
 
 def test_the_result_plots_itself(tuned: TuneResult) -> None:
@@ -246,7 +250,7 @@ def test_ride_draws_the_weighted_spectrum(responses: dict[str, Response]) -> Non
     gain = np.asarray(metrics.weighting_factor(plain[:, 0], "Wk"))
     np.testing.assert_allclose(weighted[:, 1], gain**2 * plain[:, 1], rtol=1e-9)
     felt = responses["soft"].comfort()["sprung_acceleration"].weighted_rms
-    assert f"Wk {float(felt):.3g}" in _legend(figure)[0]
+    assert f"weighted by Wk {float(felt):.3g} m/s²" in _legend(figure)[0]
 
 
 # ---- roads
@@ -286,7 +290,8 @@ def test_a_sweep_over_two_axes_is_a_map_with_its_smallest_value_and_failures() -
 def test_limits_hatch_a_map_and_ring_points_of_curves() -> None:
     data = _grid()
     figure = plots.sweep(data, "height", limits={"height": (0.5, 1.5)})
-    assert _legend(figure) == ["smallest within the limits: 1", "failed", "height below 0.5", "height above 1.5"]
+    least = "smallest within the limits: 1, at the edge: widen the grid"
+    assert _legend(figure) == [least, "failed", "height below 0.5", "height above 1.5"]
     hatched = [c for c in figure.axes[0].collections if isinstance(c, QuadContourSet) and any(c.hatches)]
     assert len(hatched) == 2 and hatched[0].hatches != hatched[1].hatches
     (axes,) = plots.sweep(data.isel(b=0), "height", limits={"height": 1.5}).axes

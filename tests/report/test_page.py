@@ -4,10 +4,17 @@ import warnings
 from pathlib import Path
 
 import jax
+import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from PIL import Image
 
 import jaxdamp
+from jaxdamp import plots
+from jaxdamp._display import Display, shown_in
+from jaxdamp._tables import Column, Table
+from jaxdamp.dampers import Bilinear, Linear, with_fitted_range
 from jaxdamp.report import Attempts, Report
 
 
@@ -83,9 +90,22 @@ def test_a_stop_between_parts_is_not_taken_for_a_failure() -> None:
 
 
 def test_the_words_of_a_page_are_those_of_its_reader() -> None:
-    attempts = Attempts(words=lambda text: text.replace("`rig`", "--rig"))
-    page = Report("Page", attempts=attempts)
-    page.verdict("first `rig`")
-    page.text("second", "`rig`")
-    page.points(["third `rig`"])
-    assert page.to_html().count("--rig") == 3 and "`" not in page.to_html().partition("<h1>")[2]
+    with shown_in(Display(wording=lambda text: text.replace("`rig`", "--rig"))):
+        page = Report("Page")
+        page.verdict("first `rig`")
+        page.text("second", "`rig`")
+        page.points(["third `rig`"])
+        page.table(table := Table("Findings", (Column("remedy"),), (("fourth `rig`",),)))
+        assert table.to_csv() == "remedy\nfourth --rig\n"
+    assert page.to_html().count("--rig") == 4 and "`" not in page.to_html().partition("<h1>")[2]
+
+
+def test_pictures_keep_the_colours_that_lines_have(tmp_path: Path) -> None:
+    law = with_fitted_range(Bilinear(2000.0, 1000.0), velocity=(-0.3, 0.3))
+    figure = plots.force_velocity({"new": law, "other": Linear(700.0), "old": Linear(300.0)}, baseline="old")
+    Report("title", tmp_path).picture(figure, "laws", "laws.png")
+    drawn = np.asarray(Image.open(tmp_path / "laws.png").convert("RGB"), int).reshape(-1, 3)
+    roles = [plots.ROLES[name]["color"] for name in ("after", "before", "shade")]
+    for colour in (*roles, "#D55E00", "#E6E6E6", "#FFFFFF"):  # lines, what is extrapolated, grid, paper
+        away = np.abs(drawn - np.round(255.0 * np.array(to_rgb(colour)))).max(axis=1)
+        assert np.sum(away <= 5.0) > 100, colour

@@ -21,16 +21,18 @@ def test_length_and_speed_are_a_duration():
 
 def test_gradient_in_speed_equals_closed_form():
     length, speed, t = 2.5, 10.0, 1.1
-    slope = jax.grad(lambda v: cosine_bump(0.06, start=1.0, length=length, speed=v).height(jnp.array([t]))[0, 0])(speed)
+    slope = jax.jit(
+        jax.grad(lambda v: cosine_bump(0.06, start=1.0, length=length, speed=v).height(jnp.array([t]))[0, 0])
+    )(speed)
     s = (t - 1.0) * speed / length
     assert slope == pytest.approx(0.03 * 2 * np.pi * np.sin(2 * np.pi * s) * (t - 1.0) / length, rel=1e-12)
 
 
 def test_gradient_in_start_is_minus_the_slope_in_time():
     time = jnp.array([0.9, 1.05, 1.2, 1.5])
-    by_start = jax.jacfwd(lambda t0: cosine_bump(0.06, start=t0, duration=0.25).height(time)[:, 0])(1.0)
+    by_start = jax.jit(jax.jacfwd(lambda t0: cosine_bump(0.06, start=t0, duration=0.25).height(time)[:, 0]))(1.0)
     bump = cosine_bump(0.06, start=1.0, duration=0.25)
-    by_time = jax.vmap(jax.grad(lambda t: bump.height(t[None])[0, 0]))(time)
+    by_time = jax.jit(jax.vmap(jax.grad(lambda t: bump.height(t[None])[0, 0])))(time)
     np.testing.assert_allclose(by_start, -by_time, atol=1e-14)
     assert abs(by_start[1]) > 0.1 and by_start[0] == 0.0 and by_start[3] == 0.0
 

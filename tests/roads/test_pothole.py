@@ -20,7 +20,7 @@ def test_floor_edges_and_slope_are_the_stated_ones():
         -0.08 * np.tanh(2.0), rel=1e-12
     )
     np.testing.assert_allclose(road.height(jnp.array([1.0 - 0.055, 1.0 + 0.055]))[:, 0], [-0.008, -0.072], atol=2e-4)
-    slope = jax.grad(lambda t: road.height(t[None])[0, 0])(jnp.array(1.0))
+    slope = jax.jit(jax.grad(lambda t: road.height(t[None])[0, 0]))(jnp.array(1.0))
     assert float(slope) == pytest.approx(-0.08 / (2 * 0.05), rel=1e-12)
 
 

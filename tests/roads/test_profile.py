@@ -86,13 +86,15 @@ def test_grid_and_duration_are_unknown_where_speed_is_traced(heights):
 
 def test_gradient_in_speed_is_slope_times_time(heights):
     t = 1.234
-    gradient = jax.grad(lambda v: from_profile(POSITION, heights, speed=v).height(jnp.array([t]))[0, 0])(7.0)
+    gradient = jax.jit(jax.grad(lambda v: from_profile(POSITION, heights, speed=v).height(jnp.array([t]))[0, 0]))(7.0)
     left = int(t * 7.0 / 0.05)
     assert gradient == pytest.approx((heights[left + 1] - heights[left]) / 0.05 * t, rel=1e-9)
 
 
 def test_gradient_in_heights_is_the_interpolation_weight(heights):
-    weights = jax.grad(lambda h: from_profile(POSITION, h).height(jnp.array([0.0625]))[0, 0])(jnp.asarray(heights))
+    weights = jax.jit(jax.grad(lambda h: from_profile(POSITION, h).height(jnp.array([0.0625]))[0, 0]))(
+        jnp.asarray(heights)
+    )
     expected = np.zeros(400)
     expected[1:3] = 0.75, 0.25
     np.testing.assert_allclose(weights, expected, atol=1e-12)

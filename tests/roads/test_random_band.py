@@ -78,7 +78,7 @@ def test_seeds_reproduce_and_differ():
 
 def test_seeds_can_be_batched():
     keys = jax.random.split(jax.random.key(0), 3)
-    batch = jax.vmap(lambda key: road(seed=key).samples)(keys)
+    batch = jax.jit(jax.vmap(lambda key: road(seed=key).samples))(keys)
     np.testing.assert_allclose(batch, jnp.stack([road(seed=key).samples for key in keys]), atol=1e-15)
 
 

@@ -17,7 +17,7 @@ from jaxdamp.vehicles.presets import full_car_jazar, half_car_002, m113_003, qua
 HALF, FULL, SPEED = half_car_002(), full_car_jazar(), 20.0
 GROUND = roads.iso8608("C", SPEED, seed=1, length=200.0)
 PLATFORM = roads.from_profile(0.01 * np.arange(200), 0.01 * np.sin(0.3 * np.arange(200)))
-TIME = jnp.arange(0.0, 1.0, 0.004)
+TIME = jnp.asarray(np.arange(0.0, 1.0, 0.004), float)
 LATER = {"half": HALF, "full": FULL, "truck": truck_001(), "hull": m113_003()}
 
 

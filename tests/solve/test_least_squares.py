@@ -10,8 +10,8 @@ from jaxdamp._status import Status
 from jaxdamp.solve import BoundedLevenbergMarquardt, ImplicitWithinBounds, Linearisation, least_squares_on_host
 
 
-TIME = jnp.linspace(0.0, 2.0, 50)
-DATA = 3.0 * jnp.exp(-1.5 * TIME) + 0.01 * jnp.sin(40.0 * TIME)
+TIME = np.linspace(0.0, 2.0, 50)
+DATA = 3.0 * np.exp(-1.5 * TIME) + 0.01 * np.sin(40.0 * TIME)
 
 
 def misses(y, data):
@@ -50,7 +50,7 @@ def test_host_and_jax_take_the_same_steps(upper):
 
 
 def test_lanes_end_by_themselves_and_are_computed_no_more():
-    data, seen = jnp.stack([DATA, 3.0 * jnp.exp(-1.0 * TIME), 0.01 * DATA]), []
+    data, seen = np.stack([DATA, 3.0 * np.exp(-1.0 * TIME), 0.01 * DATA]), []
     end = on_host(data, BoundedLevenbergMarquardt(lower=np.zeros(2), upper=np.full(2, np.inf)), record=seen)
     alone = [on_host(row[None], BoundedLevenbergMarquardt(lower=np.zeros(2), upper=np.full(2, np.inf))) for row in data]
     for lane, single in enumerate(alone):
@@ -86,7 +86,7 @@ def test_the_gradient_of_a_solution_is_that_of_differences():
         solver = BoundedLevenbergMarquardt(lower=0.0, upper=jnp.asarray([10.0, upper]), tolerance=1e-9)
         return optx.least_squares(misses, solver, jnp.ones(2), data, adjoint=ImplicitWithinBounds()).value
 
-    along = jnp.cos(7.0 * TIME)
+    along = np.cos(7.0 * TIME)
     for upper in (10.0, 1.2):  # inside, and with the second number at its bound
         slope = jax.jit(jax.grad(lambda d, upper=upper: rate(d, upper) @ jnp.asarray([1.0, 2.0])))(DATA) @ along
         ends = [rate(DATA + h * along, upper) @ jnp.asarray([1.0, 2.0]) for h in (1e-4, -1e-4)]

@@ -5,7 +5,7 @@ import xarray
 
 import jaxdamp
 from jaxdamp.sweeps import points, running
-from jaxdamp.sweeps.file import SweepFile
+from jaxdamp.sweeps.sweeping import SweepFile
 
 from .cases import AXES, decay
 

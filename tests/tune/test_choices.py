@@ -23,9 +23,9 @@ def test_the_best_choice_is_that_of_all_of_them() -> None:
 
 
 def test_what_is_free_beside_a_choice_is_best_for_it() -> None:
-    """Two catalogues and a bound, with a limit: against all combinations, each with the rest searched."""
+    """Two catalogues and a bound, with a limit: against all combinations, of which one is the best."""
     car = vehicles.presets.quarter_car_000(dampers.Linear(1500.0) + dampers.Linear(1500.0))
-    choices = {"spring_rate": [40e3, 60e3, 75e3], "damper.terms.0.rate": [1000.0, 1500.0, 2600.0]}
+    choices = {"spring_rate": [40e3, 60e3, 75e3], "damper.terms.0.rate": [1000.0, 1500.0, 3600.0]}
     free = {"damper.terms.1.rate": (500.0, 1800.0)}
     limits = {TYRE: 1300.0}
     found = tune.minimise(

@@ -176,10 +176,9 @@ def test_without_double_precision_a_search_still_ends_at_the_optimum():
 
 
 def test_a_search_that_runs_out_of_steps_says_so():
-    law = dampers.Bilinear(2500.0, 2500.0)
-    result = tune.minimise(
-        "rms_sprung_acceleration", vehicles.presets.quarter_car_000(law), roads.white("C", 20.0), max_steps=1
-    )
+    car = vehicles.presets.quarter_car_000(dampers.Linear(600.0))
+    bounds = {"damper.rate": None}
+    result = tune.minimise("rms_sprung_acceleration", car, roads.white("C", 20.0), bounds=bounds, max_steps=1)
     assert not result.converged and len(result.history) == 1
     assert any("stopped after 1 steps, before an optimum" in w and "`max_steps`" in w for w in result.warnings)
     assert "terminated successfully" not in " ".join(result.warnings)

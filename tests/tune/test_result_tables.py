@@ -39,7 +39,7 @@ FRESH = Rescore(
 def test_a_tuning_stands_in_two_tables() -> None:
     assert RESULT.table().rows == (
         ("rms_sprung_acceleration", "m/s²", 2.0, 1.5, pytest.approx(-25.0), "minimised"),
-        ("rms_dynamic_tyre_load", "N", 500.0, 550.0, pytest.approx(10.0), "limit 550, reached"),
+        ("rms_dynamic_tyre_load", "N", 500.0, 550.0, pytest.approx(10.0), "limit 550 N, reached"),
         ("lift_off_fraction", "–", 0.0, 0.1, None, ""),
     )
     (row,) = RESULT.parameter_table().records()

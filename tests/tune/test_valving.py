@@ -36,6 +36,21 @@ def test_the_valving_of_a_known_damper_is_recovered_from_its_curve():
     assert result.rmse < 1e-3
 
 
+def test_both_valves_of_a_twin_tube_are_chosen():
+    truth = dampers.TwinTube.reference()
+    chosen = ["piston.rebound_opening_pressure", "base.leak"]
+    start = parameters.replace(truth, {name: 1.3 * float(parameters.get(truth, name)) for name in chosen})
+    force = np.asarray(rig.quasi_static(truth.incompressible(), 0.35 * CURVE).force)
+    result = tune.valving((0.35 * CURVE, force), start, over=chosen, starts=1)
+    assert result.feasible
+    for p in result.parameters:
+        assert p.value == pytest.approx(float(parameters.get(truth, p.name)), rel=1e-5)
+    moved = tune.valving((0.35 * CURVE, 1.05 * force), truth, starts=1, freeze=["gas.pressure"])
+    assert {p.name.split(".")[0] for p in moved.parameters} == {"piston", "base"} and moved.rmse < 0.02 * np.abs(
+        force
+    ).max()
+
+
 def test_a_target_beyond_the_bounds_names_them(out_of_reach):
     result = out_of_reach
     assert not result.feasible and result.error_percent > 3.0

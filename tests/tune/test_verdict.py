@@ -1,6 +1,7 @@
 """The first sentence of a tuning: better or not, by how much, at what price, within which limits."""
 
 import dataclasses
+import re
 from typing import Any
 
 import jax.numpy as jnp
@@ -79,7 +80,7 @@ def test_a_violated_limit_is_said_first_with_its_number():
     value = f"{result.after['working_space_rms']:.4g}"
     assert result.summary.startswith(f"Limit not met: working_space_rms is {value}, and must be <= 0.001 m")
     (row,) = [row for row in result.table().records() if row["metric"] == "working_space_rms"]
-    assert row["note"] == "limit 0.001, violated" and result.verdict.outcome is Outcome.LIMIT_NOT_MET
+    assert row["note"] == "limit 0.001 m, violated" and result.verdict.outcome is Outcome.LIMIT_NOT_MET
     labels = [label.get_text() for axes in result.plot().axes for label in axes.get_yticklabels()]
     assert "suspension travel, RMS (LIMIT VIOLATED)" in labels
 
@@ -157,3 +158,40 @@ def test_limits_that_other_roads_break_are_tightened():
     assert once.fresh is None and "tried on no other" in once.verdict.sentence
     assert result.fresh is not None and result.fresh.roads >= 4
     assert result.verdict.outcome is not Outcome.LIMIT_LOST
+
+
+def moved_limit(result: Any) -> float:
+    """The one number that a relaxation proposes."""
+    (text,) = re.findall(r"[<>]= ([0-9.e+-]+)", result.relaxation)
+    return float(text)
+
+
+def test_the_cheapest_relaxation_gives_one_percent():
+    """By its price: run again with the limit that the result proposes."""
+    soft = presets.quarter_car_000(dampers.Linear(6000.0))
+    result = tune.minimise("working_space_rms", soft, WHITE, limits={TYRE: "+1%"})
+    assert result.relaxation.startswith(f"Cheapest for 1 % less working_space_rms: {TYRE} <= ")
+    assert result.summary.endswith(result.relaxation)
+    again = tune.minimise("working_space_rms", soft, WHITE, limits={TYRE: moved_limit(result)})
+    assert again.after["working_space_rms"] / result.after["working_space_rms"] == pytest.approx(0.99, abs=1e-3)
+    assert tune.minimise(COMFORT, CAR, WHITE, limits={TYRE: "+90%"}).relaxation == ""
+
+
+def test_of_limits_that_are_not_met_those_within_reach_are_said():
+    """They are met, and 1 % less is not."""
+    result = tune.minimise(COMFORT, CAR, WHITE, limits={"working_space_rms": 1e-3})
+    reach = moved_limit(result)
+    assert (
+        result.relaxation.startswith("Within reach: working_space_rms <= ") and " instead of 0.001." in result.summary
+    )
+    for factor, met in ((1.0, True), (0.99, False)):
+        again = tune.minimise(COMFORT, CAR, WHITE, limits={"working_space_rms": factor * reach})
+        assert (not again.violated) is met
+
+
+def test_percentiles_over_fresh_roads():
+    fresh = made_up([1.0, 4.0, 2.0], [1.0] * 3, [1.0] * 3).fresh
+    assert fresh is not None
+    assert fresh.percentile(COMFORT, 50.0) == (1.0, 2.0) and fresh.percentile(COMFORT, 75.0) == (1.0, 3.0)
+    with pytest.raises(ValueError, match="`percent`"):
+        fresh.percentile(fresh.metric, 101.0)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import dampers, simulate
+from jaxdamp.metrics import Metric
 from jaxdamp.vehicles import Corner, Element, HalfCar, QuarterCar, presets
 
 from .fleet import bumps, tracks, vehicles
@@ -61,3 +62,30 @@ def test_refuses_what_cannot_be():
         Element("damper", dampers.Linear(1.0), 0)
     with pytest.raises(ValueError, match="Did you mean 'damper'"):
         presets.quarter_car_000().frame().element("dampr")
+
+
+def test_velocities_of_bodies_wheels_places_and_struts_are_channels_and_have_metrics():
+    car = presets.half_car_002()
+    run = simulate(car, tracks(bumps([0.02, 0.15], 301)))
+    rate = dict(zip(car.coordinates, np.asarray(run.motion).T[len(car.coordinates) :], strict=True))
+    for name in ("sprung", "front_unsprung", "rear_unsprung"):
+        np.testing.assert_allclose(run[f"{name}_velocity"], rate[f"z_{name}"], rtol=1e-12)
+        middle = np.gradient(np.asarray(run[f"z_{name}"]), 1e-3)
+        np.testing.assert_allclose(run[f"{name}_velocity"][1:-1], middle[1:-1], atol=2e-3 * np.abs(middle).max())
+    np.testing.assert_allclose(run["pitch_velocity"], rate["pitch"], rtol=1e-12)
+    assert run.units["pitch_velocity"] == "rad/s" and run.units["sprung_velocity"] == "m/s"
+    for end in ("front", "rear"):
+        own = run[f"{end}_body_velocity"] - run[f"{end}_unsprung_velocity"]
+        np.testing.assert_allclose(own, run[f"{end}_damper_velocity"], rtol=1e-9, atol=1e-12)
+    value = run.metrics([Metric("sprung_velocity", "rms")])["rms_sprung_velocity"]
+    assert float(value) == pytest.approx(np.sqrt(np.mean(np.square(run["sprung_velocity"]))), rel=1e-12)
+
+
+def test_a_turning_hull_has_the_velocity_above_each_road_wheel_with_a_damper():
+    hull = presets.m113_003()
+    names = [name for name in hull.units if name.endswith("_body_velocity")]
+    assert names == [f"{name.removesuffix('_force').removesuffix('_damper')}_body_velocity" for name in _forces(hull)]
+
+
+def _forces(car):
+    return [name for name in car.units if name.endswith("_damper_force")]

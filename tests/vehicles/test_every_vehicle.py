@@ -88,7 +88,7 @@ def test_units_cover_the_channels_and_metrics_name_channels(vehicle: AbstractVeh
     units = vehicle.units
     assert {m.channel for m in vehicle.ride_metrics} <= set(units)
     assert len({m.name for m in vehicle.ride_metrics}) == len(vehicle.ride_metrics)
-    assert {unit for unit in units.values()} <= {"m", "rad", "m/s", "m/s^2", "rad/s^2", "N", ""}
+    assert {unit for unit in units.values()} <= {"m", "rad", "m/s", "rad/s", "m/s^2", "rad/s^2", "N", ""}
     assert "rms_sprung_acceleration" in {m.name for m in vehicle.ride_metrics}
 
 

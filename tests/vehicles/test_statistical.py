@@ -90,6 +90,7 @@ HYSTERESIS = {
 
 
 @pytest.mark.parametrize("name", HYSTERESIS)
+@pytest.mark.exhaustive_cases("Bouc-Wen")
 def test_laws_with_states_are_near_a_simulation(name):
     """The car with the equivalent linear damper on the same road says how far the road is from its expectation."""
     car, dt = quarter_car_000(HYSTERESIS[name]), 2e-3
@@ -105,7 +106,7 @@ def test_laws_with_states_are_near_a_simulation(name):
     assert acceleration(HYSTERESIS[name]) == pytest.approx(expected, rel=0.05)
 
 
-@pytest.mark.parametrize("name", [pytest.param("friction", marks=pytest.mark.slow), "Dahl"])
+@pytest.mark.parametrize("name", ["friction", pytest.param("Dahl", marks=pytest.mark.slow)])
 def test_derivatives_are_those_of_difference_quotients_in_both_modes_first_and_second(name):
     law = {
         "friction": FRICTION,

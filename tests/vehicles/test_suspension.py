@@ -3,6 +3,7 @@
 import dataclasses
 import inspect
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -36,13 +37,14 @@ def hull(laws, added=0.0):
     return dataclasses.replace(own, wheel_rate=own.wheel_rate + added, **laws)
 
 
+@eqx.filter_jit
 def stiffness_at_rest(vehicle):
     form = vehicle.port_form()
     slopes, _ = Ports(vehicle.elements()).stiffness_and_damping(jnp.zeros(form.ports.shape[0]))
     road = form.road_stiffness
     if form.port_road is not None:
         road = road + form.ports.T @ (slopes[:, None] * form.port_road)
-    return np.asarray(form.stiffness + form.ports.T @ (slopes[:, None] * form.ports)), np.asarray(road)
+    return form.stiffness + form.ports.T @ (slopes[:, None] * form.ports), road
 
 
 @pytest.mark.parametrize(

@@ -37,6 +37,8 @@ def test_matrices_and_channels_of_a_quarter_car_by_hand(rng):
         "z_road": road,
         "dynamic_tyre_load": -tyre,
         "relative_tyre_load": -tyre / (340.0 * 9.80665),
+        "sprung_velocity": vs,
+        "unsprung_velocity": vu,
     }
     assert set(expected) == set(system.layout.units)
     for found, name in zip(system.outputs(*at), system.layout.units, strict=True):

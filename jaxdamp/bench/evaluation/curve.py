@@ -64,11 +64,12 @@ def on_loop(cycles: FoldedCycles, sign: float, velocity: float, window: float) -
     Each branch is fitted by a straight line over the velocities within a share of the stated one. NaN where the
     record does not reach it.
     """
-    forces = []
-    for v, f in zip(sign * cycles.velocity, cycles.force, strict=True):
-        accelerating = np.gradient(v) > 0
-        branches = [_force_at(v[branch], f[branch], velocity, window) for branch in (accelerating, ~accelerating)]
-        forces.append(np.mean(branches))
+    directed = sign * cycles.velocity
+    branches = np.gradient(directed, axis=1) > 0
+    forces = [
+        0.5 * sum(_force_at(v[branch], f[branch], velocity, window) for branch in (accelerating, ~accelerating))
+        for v, f, accelerating in zip(directed, cycles.force, branches, strict=True)
+    ]
     return measured(np.array(forces))
 
 
@@ -110,7 +111,7 @@ def _bend(stroke: Cycle, velocity: Cycle, force: Cycle, sign: float) -> tuple[fl
     nothing = float("nan")
     if use.sum() < 8:
         return nothing, nothing, nothing, nothing
-    straight, left = _solve(np.stack([np.ones(len(v)), x, v], axis=1)[None], f)
+    straight, left = _solve(np.stack([np.ones(len(v)), x, v])[None], f)
     low, high = np.quantile(v, [0.1, 0.9])
     knees = np.linspace(low, high, _KNEES)
     near = int(np.argmin(_with_knees(v, x, f, knees)[1]))
@@ -128,14 +129,21 @@ def _with_knees(v: Cycle, x: Cycle, force: Cycle, knees: Float[np.ndarray, " kne
     """Least squares with two rates for each of several knee velocities: F₀, k, c_low, c_high and the squares left."""
     ramps = [np.broadcast_to(c, (len(knees), len(v))) for c in (np.ones(len(v)), x)]
     bent = [np.minimum(v, knees[:, None]), np.maximum(v - knees[:, None], 0.0)]
-    return _solve(np.stack([*ramps, *bent], axis=2), force)
+    return _solve(np.stack([*ramps, *bent], axis=1), force)
 
 
-def _solve(columns: Float[np.ndarray, "knees points terms"], force: Cycle) -> tuple[np.ndarray, np.ndarray]:
-    """Least squares for many sets of columns, and the squares that each leaves."""
-    sizes = np.sqrt(np.einsum("kpt,kpt->kt", columns, columns))
-    scaled = columns / np.where(sizes > 0.0, sizes, 1.0)[:, None, :]
-    turned = scaled.transpose(0, 2, 1)  # normal equations of columns of one size: far less work than a pinv of these
-    solutions = (np.linalg.pinv(turned @ scaled, 1e-12, hermitian=True) @ (turned @ force)[..., None])[..., 0]
-    solutions = solutions / np.where(sizes > 0.0, sizes, 1.0)
-    return solutions, np.sum((np.einsum("kpt,kt->kp", columns, solutions) - force) ** 2, axis=1)
+def _solve(rows: Float[np.ndarray, "knees terms points"], force: Cycle) -> tuple[np.ndarray, np.ndarray]:
+    """Least squares for many sets of terms, and the squares that each leaves.
+
+    By normal equations of terms of one size, and their eigenvalues: far less work than a pseudo-inverse of the terms.
+    """
+    gram = rows @ rows.transpose(0, 2, 1)
+    sizes = np.sqrt(np.einsum("ktt->kt", gram))
+    sizes = np.where(sizes > 0.0, sizes, 1.0)
+    values, vectors = np.linalg.eigh(gram / (sizes[:, :, None] * sizes[:, None, :]))
+    seen = values > 1e-12 * values[:, -1:]
+    inverse = np.divide(1.0, values, out=np.zeros_like(values), where=seen)
+    along = np.matmul(vectors.transpose(0, 2, 1), (rows @ force / sizes)[..., None])[..., 0]
+    solutions = np.matmul(vectors, (inverse * along)[..., None])[..., 0] / sizes
+    left = np.matmul(solutions[:, None, :], rows)[:, 0] - force
+    return solutions, np.einsum("kp,kp->k", left, left)

@@ -12,9 +12,8 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._documents import read_text
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Table, plain
-from jaxdamp._types import Figure
 from jaxdamp.bench.evaluation.measurements import Measurement, at_velocity
 
 
@@ -103,11 +102,7 @@ class LimitCheck(AbstractResult):
         """How many limits are kept."""
         return f"{len(self.results) - len(self.warnings)} of {len(self.results)} limits are kept."
 
-    def plot(self) -> Figure:
-        """Each measured value between its limits (`plots.limit_check`)."""
-        from jaxdamp import plots
-
-        return plots.limit_check(self)
+    plot = drawn_by("limit_check", "Each measured value between its limits.")
 
     def table(self) -> Table:
         """A row for each limit and measurement, with the verdict."""

@@ -55,7 +55,9 @@ class Evaluation(AbstractResult):
     @property
     def summary(self) -> str:
         """Numbers of records and of settings."""
-        return f"{len(self.runs)} records at {len(self.settings)} settings, forces by {self.method}."
+        runs, settings = len(self.runs), len(self.settings)
+        of_each = f"{runs} record{'s' * (runs != 1)} at {settings} setting{'s' * (settings != 1)}"
+        return f"{of_each}, forces by {self.method}."
 
     @property
     def runs(self) -> tuple[BenchRun, ...]:

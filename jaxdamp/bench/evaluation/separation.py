@@ -8,9 +8,8 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Table
-from jaxdamp._types import Figure
 from jaxdamp.bench.analysis import FoldedCycles, fold_cycles
 from jaxdamp.bench.evaluation.measurements import Measurement, measured
 from jaxdamp.bench.motion import Samples
@@ -107,11 +106,7 @@ class GasAndFriction(AbstractResult):
         """The figures as plain data."""
         return {"record": self.record, "note": self.note, **self.table().to_dict()}
 
-    def plot(self) -> Figure:
-        """Force over stroke in both directions, with the even and the odd part."""
-        from jaxdamp import plots
-
-        return plots.gas_and_friction(self)
+    plot = drawn_by("gas_and_friction", "Force over stroke in both directions, with the even and the odd part.")
 
     def __repr__(self) -> str:
         return "\n".join([str(self.table()), *([self.note] if self.note else [])])

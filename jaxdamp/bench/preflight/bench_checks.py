@@ -42,7 +42,7 @@ def turned_by_the_reader(runs: Sequence[BenchRun]) -> list[Finding]:
 
 def turned_motion(runs: Sequence[BenchRun]) -> list[Finding]:
     """A record whose rebound looks like the compression of the others of its command, and the other way round."""
-    whole = [run for run in runs if run.cycles]
+    whole = [run for run in runs if run.cycles and run.command_channel is None]
     if len(whole) < 3:
         return []
     points = peak_velocity_points(whole)

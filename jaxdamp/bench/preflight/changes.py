@@ -5,11 +5,16 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from jaxdamp.bench.analysis import FoldedCycles
 from jaxdamp.bench.motion import Samples
 from jaxdamp.bench.preflight.finding import Examined, Finding
 
 
 _FEWEST = 6  # parts of a record, from which a change in it can be told from scatter
+_FEW = 3  # cycles, of which two are on one side of a change, so that they show how well the force repeats
+_PLACES = 32  # in a cycle, where a change is looked for
+_ABOVE = 2.0  # times the noise: the force does not repeat
+_REPEATS = 0.15  # of the squares about the mean cycle, left on both sides of a change; a uniform drift leaves 0.2
 _MOST = 40  # parts of a motion that does not repeat
 _CLEAR = 8.0  # standard errors of the difference of the two levels
 _BETTER = 0.4  # of the squares that a straight line leaves: a drift is no change midway
@@ -29,17 +34,21 @@ def changes(e: Examined) -> list[Finding]:
     """A level, a delay or a gain of the force with one value before and another one behind an instant.
 
     In each cycle, or part of a motion that does not repeat, the force is described by F = o + (1 + g) F₀(v) - τ dF₀/dt,
-    with the mean curve F₀(v) of the record; each of o, τ and g is then tested for a step.
+    with the mean curve F₀(v) of the record; each of o, τ and g is then tested for a step. Where the command varies they
+    change with it. In three to five cycles only a delay is looked for, by the force at equal parts of the cycles.
     """
     parts = _parts(e)
+    if e.run.command_channel is not None:
+        return []
+    if e.cycles is not None and _FEW <= len(e.cycles.starts) < _FEWEST:
+        return _late_in_few_cycles(e, e.cycles)
     if len(parts) < _FEWEST:
         return []
     offset, delay, gain = _of_parts(e, parts)
     force = e.run.force[e.moving]
     span = float(np.ptp(np.quantile(force, (0.01, 0.99))))
-    cut = "Use the record on one side of it: `process(between=...)`."
     kinds = (
-        ("delay", "delay changes", delay, max(_DELAY / e.run.frequency, 1.0 / e.run.sampling_rate), "s"),
+        ("delay", "delay changes", delay, _least_delay(e), "s"),
         ("force level", "force level changes", offset, _LEVEL * span, "N"),
         ("gain", "gain changes", gain, _GAIN, ""),
     )
@@ -47,14 +56,64 @@ def changes(e: Examined) -> list[Finding]:
         step = _step(series)
         if step is not None and abs(step.size) > least:
             place = (int(parts[step.last]), int(parts[min(step.last + 2, len(parts) - 1)]) - 1)
-            words = {
-                "s": f"the force is {1e3 * step.size:+.3g} ms later from about {e.run.time[place[0]]:.3g} s on",
-                "N": f"the force is {step.size:+.3g} N higher from about {e.run.time[place[0]]:.3g} s on",
-                "": f"the force is {100 * step.size:+.3g} % larger from about {e.run.time[place[0]]:.3g} s on",
-            }[unit]
-            why = "A delay, a plug or a range that changed during the record. "
-            return e.finding("warning", name, f"{words}, and not before", step.size, unit, place, why + cut)
+            return _said(e, name, step.size, unit, place)
     return []
+
+
+def _said(e: Examined, name: str, size: float, unit: str, place: tuple[int, int]) -> list[Finding]:
+    number = {"s": f"{1e3 * size:+.3g} ms later", "N": f"{size:+.3g} N higher", "": f"{100 * size:+.3g} % larger"}[unit]
+    words = f"the force is {number} from about {e.run.time[place[0]]:.3g} s on, and not before"
+    why = "A delay, a plug or a range that changed during the record. Use the record on one side of it:"
+    return e.finding("warning", name, words, size, unit, place, f"{why} `process(between=...)`.")
+
+
+def _late_in_few_cycles(e: Examined, cycles: FoldedCycles) -> list[Finding]:
+    """A delay that begins midway in three to five cycles.
+
+    Cycles repeat on both sides of it, and the mean one of one side, shifted in time, is that of the other side.
+    """
+    force = cycles.force
+    (count, points), noise = force.shape, e.noise["force"] ** 2
+    places = range(points // 2, force.size - points // 2 + 1, max(points // _PLACES, 1))
+    left, at = min((_sides(force, place).left, place) for place in places)
+    sides, about_mean = _sides(force, at), float(np.sum((force - force.mean(axis=0)) ** 2))
+    degrees = (count - 1) * points
+    above = about_mean - noise * degrees
+    inside = left - noise * (degrees - np.count_nonzero(sides.there))
+    if about_mean < _ABOVE * noise * degrees or inside > _REPEATS * above:
+        return []
+    shifts = np.arange(-(points // 4), points // 4 + 1)
+    squares = [np.sum((sides.other - np.roll(sides.full, shift))[sides.there] ** 2) for shift in shifts]
+    best = int(np.argmin(squares))
+    delay = float((shifts[best] if sides.full_first else -shifts[best]) * np.mean(cycles.periods) / points)
+    if squares[best] > _BETTER * squares[len(shifts) // 2] or abs(delay) <= _least_delay(e):
+        return []
+    begin = cycles.starts[at // points] + cycles.periods[at // points] * (at % points) / points
+    sample = int(np.searchsorted(e.run.time, begin))
+    return _said(e, "delay changes", delay, "s", (sample, min(sample + points // _PLACES, len(e.run) - 1)))
+
+
+class _Sides(NamedTuple):
+    """The mean cycles before and behind an instant: one that is known as a whole, and the other."""
+
+    full: Samples
+    other: Samples
+    there: np.ndarray  # where the other is known
+    full_first: bool
+    left: float  # squares about both
+
+
+def _sides(force: Float[np.ndarray, "cycles points"], at: int) -> _Sides:
+    before = (np.arange(force.size) < at).reshape(force.shape)
+    counts = [part.sum(axis=0) for part in (before, ~before)]
+    means = [np.sum(force * part, axis=0) / np.maximum(n, 1) for part, n in zip((before, ~before), counts, strict=True)]
+    left = float(np.sum((force - np.where(before, *means)) ** 2))
+    first = bool(counts[0].min() > 0)
+    return _Sides(means[1 - first], means[first], counts[first] > 0, first, left)
+
+
+def _least_delay(e: Examined) -> float:
+    return max(_DELAY / e.run.frequency, 1.0 / e.run.sampling_rate)
 
 
 def _parts(e: Examined) -> np.ndarray:

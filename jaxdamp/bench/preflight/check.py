@@ -23,7 +23,13 @@ if TYPE_CHECKING:
 FAMILIES = (
     (motion_checks.magnitudes, motion_checks.few_samples, motion_checks.few_cycles, motion_checks.integrated),
     (sample_checks.repeated, sample_checks.edges, sample_checks.clipping, motion_checks.rest, motion_checks.run_up),
-    (sample_checks.quantisation, sample_checks.ripple, consistency.velocity, consistency.sign),
+    (
+        sample_checks.held_command,
+        sample_checks.quantisation,
+        sample_checks.ripple,
+        consistency.velocity,
+        consistency.sign,
+    ),
     (
         motion_checks.jitter,
         changes.changes,

@@ -23,7 +23,7 @@ def sign(e: Examined) -> list[Finding]:
     """A force that drives the motion, since the work of a cycle is negative, or that is the stroke."""
     if exchanged(e):
         message = "stroke and force look exchanged: the force moves as smoothly as a machine, the stroke has corners"
-        remedy = 'Name the columns: `read(columns={"stroke": ..., "force": ...})`.'
+        remedy = 'Name the columns: `columns={"stroke": ..., "force": ...}`.'
         return e.finding("error", "channels exchanged", message, None, "", None, remedy)
     if not _drives(e):
         return []
@@ -169,8 +169,11 @@ def breakaway(e: Examined) -> list[Finding]:
 
 
 def drift(e: Examined) -> list[Finding]:
-    """Damping or static force that changes from cycle to cycle, as a damper does that grows warm."""
-    if e.cycles is None or len(e.cycles.periods) < 5:
+    """Damping or static force that changes from cycle to cycle, as a damper does that grows warm.
+
+    Where the command varies it says nothing.
+    """
+    if e.cycles is None or len(e.cycles.periods) < 5 or e.run.command_channel is not None:
         return []
     figures = {name: values for (name, _), values in cycle_figures(e.cycles).items()}
     time = e.cycles.starts - e.cycles.starts[0]
@@ -180,7 +183,7 @@ def drift(e: Examined) -> list[Finding]:
     relative = change / float(figures["equivalent damping"].mean())
     if clear and abs(relative) > SMALL:
         message = f"the damping changes by {100 * relative:+.2g} % over the record, as by heat"
-        remedy = "Warm the damper up, record shorter, or fit its temperature: `dampers.TemperatureScaled`."
+        remedy = 'Warm the damper up, record shorter, or fit the heat beside the law, `rig="heat"`.'
         findings += e.finding("warning", "drift of damping", message, relative, "", place, remedy)
     change, clear = _trend(time, figures["static force"])
     if clear and abs(change) > SMALL * np.ptp(e.cycles.force):

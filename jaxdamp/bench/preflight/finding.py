@@ -52,8 +52,13 @@ class Finding:
         """The names of the records in words."""
         return ", ".join(self.records)
 
+    @property
+    def sentence(self) -> str:
+        """What is odd in which records, and what to do."""
+        return f"{self.record}: {self.message}. {self.remedy}".rstrip()
+
     def __str__(self) -> str:
-        return f"{self.severity}: {self.record}: {self.message}. {self.remedy}".rstrip()
+        return f"{self.severity}: {self.sentence}"
 
 
 class Examined:

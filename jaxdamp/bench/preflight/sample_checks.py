@@ -18,6 +18,8 @@ _ABOVE_OTHERS = 2.5  # times the edges that the damper makes in every cycle
 _LEAST_JUMP = 0.02  # of the range of a channel
 _STAYS = 0.5  # of a jump
 _TURNING = 0.05  # of the peak velocity, below which friction turns
+WHITE = 1.2  # ratio of the scatter of a channel to that of neighbours, up to which it is white noise
+LEAST_VARIATION = 0.01  # of its level, up to which a command is held
 _SQUARES = 0.05  # of the sum of squares of a channel, from which its spikes decide a fit
 
 
@@ -39,6 +41,20 @@ def repeated(e: Examined) -> list[Finding]:
             if len(part):
                 findings += _gap_finding(e, name, kind, part)
     return findings
+
+
+def held_command(e: Examined) -> list[Finding]:
+    """A channel of the command that shows no more than noise about one value."""
+    values = e.run.command_channel
+    if values is None:
+        return []
+    level, scatter = float(values.mean()), float(values.std())
+    noise = float(np.std(np.diff(values))) / np.sqrt(2.0)
+    if scatter > max(WHITE * noise, LEAST_VARIATION * abs(level)):
+        return []
+    message = f"the command varies by no more than noise, {level:.3g} ± {scatter:.1g} {e.run.command_unit}"
+    remedy = f"State it as held, `run.held_at({level:.3g})`, so that the record is fitted at one setting."
+    return e.finding("warning", "command held", message, scatter, e.run.command_unit, None, remedy)
 
 
 def _stuck(e: Examined, name: str) -> list[tuple[int, int]]:

@@ -19,12 +19,12 @@ class Control {
     this.start = number.start[k];
     [this.low, this.high] = number.ranges[k];
     this.log = this.low > 0 && this.high / this.low > 2 || this.high < 0 && this.low / this.high > 2;
-    const label = number.path + (number.scalar ? "" : `[${k}]`), dot = label.lastIndexOf(".") + 1;
-    const name = element("span", { class: "name" }, element("small", {}, label.slice(0, dot)), label.slice(dot));
+    const label = number.path + (number.scalar ? "" : `[${k}]`), said = label.replaceAll("_", " "), dot = said.lastIndexOf(".") + 1;
+    const name = element("span", { class: "name" }, element("small", {}, said.slice(0, dot).replaceAll(".", " ")), said.slice(dot));
     name.append(element("small", {}, number.unit ? ` [${unitText(number.unit)}]` : ""));
     this.box = element("input", { type: "number", step: "any", "aria-label": label, "data-path": label });
     this.slider = element("input", { type: "range", min: 0, max: SLIDER_STEPS, step: 1, "aria-label": `${label}, slider`, "data-slider": label });
-    this.undo = element("button", { type: "button", title: `back to ${this.start}`, "aria-label": `reset ${label}`, "data-reset": label }, "↺");
+    this.undo = element("button", { type: "button", title: `back to ${readable(this.start)}`, "aria-label": `reset ${label}`, "data-reset": label }, "↺");
     this.error = element("div", { class: "error", role: "alert" });
     this.row = element("div", { class: "control", title: `${number.meaning}\n${number.domain}` },
       name, this.slider, this.box, this.undo, this.error);
@@ -65,7 +65,8 @@ class Control {
 
   show(what) {
     const value = this.values[this.k];
-    if (what === "both") this.box.value = String(value);
+    this.box.dataset.value = value;
+    if (what === "both") this.box.value = String(Number(value.toPrecision(DIGITS)));  // counted as it is
     if (value < this.low || value > this.high) {
       [this.low, this.high] = [Math.min(value, this.low), Math.max(value, this.high)];
       this.log = this.log && this.low * this.high > 0;

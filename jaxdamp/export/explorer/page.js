@@ -226,7 +226,7 @@ function showChannel() {
   }
   const squared = /[/ ]/.test(unit) ? `(${unit})²/Hz` : unit === "-" ? "1/Hz" : `${unit}²/Hz`;
   charts.spectrum.show({ x: { label: "frequency", unit: "Hz", log: true, range: [0.4, 50] }, y: { label: "density", unit: squared, log: true, decades: 6, scale: scale ** 2 } }, drawn.spectrum);
-  charts.trace.show({ x: { label: "time", unit: "s", tight: true }, y: { label: channel.name.replaceAll("_", " "), unit, scale } }, drawn.trace);
+  charts.trace.show({ x: { label: "time", unit: "s", tight: true }, y: { label: channel.title, unit, scale } }, drawn.trace);
   get("channelMeaning").textContent = channel.meaning;
 }
 
@@ -296,7 +296,7 @@ function begin() {
   get("roadKind").value = profile ? "profile" : DATA.road.class;
   get("speed").value = DATA.road.speed;
   drawnRoads.forEach((_, k) => get("seed").append(element("option", { value: k }, String(iso.seed + k))));
-  DATA.channels.forEach((channel, k) => get("channel").append(element("option", { value: k }, channel.name.replaceAll("_", " "))));
+  DATA.channels.forEach((channel, k) => get("channel").append(element("option", { value: k }, channel.title)));
   get("baselineHead").textContent = DATA.baseline.title;
   for (const id of ["motion", "amplitude", "frequencies"]) get(id).addEventListener("input", schedule);
   for (const id of ["roadKind", "speed", "seed", "bumpHeight", "bumpLength"]) get(id).addEventListener("input", chooseRoad);

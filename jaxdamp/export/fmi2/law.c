@@ -1,5 +1,6 @@
 /* A damper law as the unit sees it: one input, the stroke, with its rate, the velocity. */
 #define PAIRS 1
+#define RATES PAIRS
 #define OUTPUTS 1
 #define STATES MODEL_STATES
 #define CARRY MODEL_STATES

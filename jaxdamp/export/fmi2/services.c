@@ -47,7 +47,9 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *saved) {
 }
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate saved) {
+    const fmi2CallbackFunctions *functions = ((Model *)c)->functions;
     memcpy(c, saved, sizeof(Model));
+    ((Model *)c)->functions = functions; /* the state may be that of another process */
     return fmi2OK;
 }
 

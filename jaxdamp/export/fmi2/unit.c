@@ -1,9 +1,11 @@
-/* FMI 2.0, model exchange and co-simulation, of a damper law or a vehicle. It stands behind the printed functions
- * `model_...`, behind law.c or vehicle.c, which define PAIRS, OUTPUTS, STATES, CARRY, MATRICES, RATES_GIVEN, prepare,
- * start, resume, advance, observe and observe_derivative; GUID is a text. What computes nothing is in services.c.
+/* FMI 2.0, model exchange and co-simulation, of a damper law, a vehicle or a controller. It stands behind the printed
+ * functions `model_...`, behind law.c, vehicle.c or controller.c, which define PAIRS, RATES, OUTPUTS, STATES, CARRY,
+ * MATRICES, RATES_GIVEN, prepare, start, resume, advance, observe and observe_derivative; GUID is a text. What computes
+ * nothing is in services.c.
  *
- * Inputs come in pairs of a value and its rate: first all values, then all rates. The carry of a run begins with the
- * continuous states.
+ * Inputs come in pairs of a value and its rate: first all values, then all rates; those of a controller have no rates.
+ * The carry of a run begins with the continuous states. Models with a PERIOD are sampled: for co-simulation only, and
+ * the last number of the carry counts the steps since a sample.
  *
  * Co-simulation has no delay of a step. A step ends at inputs that the importer knows only afterwards: after fmi2DoStep
  * they are extrapolated (or follow from fmi2SetRealInputDerivatives), and as soon as the inputs of the new instant are
@@ -15,13 +17,14 @@
 
 #include "fmi2Functions.h"
 
-#define INPUTS (2 * PAIRS)
+#define INPUTS (PAIRS + RATES)
 #define NUMBERS (sizeof(model_parameters) / sizeof(double))
 enum { FIRST_OUTPUT = INPUTS, LONGEST_STEP = INPUTS + OUTPUTS, FIRST_NUMBER };
 #define FIRST_STATE (FIRST_NUMBER + NUMBERS)
 #define FIRST_RATE (FIRST_STATE + STATES)
 
 typedef struct {
+    const fmi2CallbackFunctions *functions; /* of the importer */
     model_parameters p;
     double longest;                 /* s, longest step of the model; longer communication steps are divided */
     double matrices[MATRICES + 1];  /* what follows from the parameters and this step */
@@ -42,9 +45,10 @@ typedef struct {
     int known;                      /* `end` and `used` are up to date */
 } Model;
 
-static void set_defaults(Model *m) {
+static void set_defaults(Model *m, const fmi2CallbackFunctions *functions) {
     int k;
     memset(m, 0, sizeof *m);
+    m->functions = functions;
     m->longest = DEFAULT_STEP;
     m->step = DEFAULT_STEP;
     m->changed = 1;
@@ -56,7 +60,7 @@ static void set_defaults(Model *m) {
  * the slope extrapolated to its end. */
 static void use_slopes(Model *m, double *u0) {
     int k;
-    for (k = 0; k < PAIRS; ++k) {
+    for (k = 0; k < RATES; ++k) {
         const double slope = (m->input[k] - m->input0[k]) / m->h;
         const double before = m->steps > 1 ? m->slope_before[k] : slope;
         if (m->rated[k]) continue;
@@ -65,12 +69,35 @@ static void use_slopes(Model *m, double *u0) {
     }
 }
 
+/* Steps of the model in a communication step from this carry on; zero if samples cannot lie between two of them. */
+static int steps_in(const Model *m, const double *carry, double h) {
+    int n = (int)ceil(h / m->longest - 1e-9);
+    if (n < 1) n = 1;
+#ifdef PERIOD
+    {
+        const double times[3] = {PERIOD, DELAY, carry[CARRY - 1] * m->step};
+        const int most = 64 * n;
+        for (; n <= most; ++n) {
+            int k, whole = 1;
+            for (k = 0; k < 3; ++k) {
+                const double count = times[k] * n / h;
+                whole = whole && fabs(count - floor(count + 0.5)) < 1e-6;
+            }
+            if (whole) return n;
+        }
+        return 0;
+    }
+#else
+    UNUSED(carry);
+    return n;
+#endif
+}
+
 /* The states at the end of the step. */
 static void refresh(Model *m) {
-    int n = (int)ceil(m->h / m->longest - 1e-9);
+    const int n = m->h > 0.0 ? steps_in(m, m->carry, m->h) : 1;
     double u0[INPUTS], step;
     if (m->known) return;
-    if (n < 1) n = 1;
     step = m->h > 0.0 ? m->h / n : m->step;
     memcpy(u0, m->input0, sizeof u0);
     memcpy(m->used, m->input, sizeof u0);
@@ -90,10 +117,10 @@ static void refresh(Model *m) {
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging) {
     Model *m;
-    UNUSED(name), UNUSED(type), UNUSED(resources), UNUSED(functions), UNUSED(visible), UNUSED(logging);
+    UNUSED(name), UNUSED(type), UNUSED(resources), UNUSED(visible), UNUSED(logging);
     if (!guid || strcmp(guid, GUID)) return NULL;
     m = (Model *)malloc(sizeof *m);
-    if (m) set_defaults(m);
+    if (m) set_defaults(m, functions);
     return m;
 }
 
@@ -106,7 +133,7 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
 }
 
 fmi2Status fmi2Reset(fmi2Component c) {
-    set_defaults((Model *)c);
+    set_defaults((Model *)c, ((Model *)c)->functions);
     return fmi2OK;
 }
 
@@ -129,6 +156,12 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     return fmi2OK;
 }
 
+static fmi2Status refused(const Model *m, fmi2String why) {
+    if (m->functions && m->functions->logger)
+        m->functions->logger(m->functions->componentEnvironment, "model", fmi2Error, "logStatusError", why);
+    return fmi2Error;
+}
+
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {
     Model *m = (Model *)c;
     size_t i;
@@ -139,7 +172,12 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
             m->guessed[k] = m->given[k] = 0;
             if (k >= PAIRS && value[i] != 0.0) m->rated[k - PAIRS] = 1;
         } else if (k == LONGEST_STEP && value[i] > 0.0) {
+            const double before = m->longest;
             m->longest = value[i];
+            if (m->h > 0.0 && !steps_in(m, m->carry, m->h)) {
+                m->longest = before;
+                return refused(m, "With this longest step samples cannot lie between two steps of the model.");
+            }
         } else if (k >= FIRST_NUMBER && k < FIRST_STATE) {
             double *number = (double *)&m->p + (k - FIRST_NUMBER);
             if (*number != value[i]) m->changed = 1;
@@ -152,6 +190,14 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     return fmi2OK;
 }
 
+#ifdef PERIOD
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t n,
+                                        const fmi2ValueReference known[], size_t count, const fmi2Real change[],
+                                        fmi2Real value[]) {
+    UNUSED(unknown), UNUSED(n), UNUSED(known), UNUSED(count), UNUSED(change), UNUSED(value);
+    return refused((Model *)c, "A controller jumps at its samples and has no derivatives; export the passive vehicle.");
+}
+#else
 /* Changes of the outputs and of the rates of the states, for model exchange: in co-simulation the states at the end of
  * a step depend on the inputs. */
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t n,
@@ -210,6 +256,8 @@ fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real rates[], size_t n) {
     return fmi2OK;
 }
 
+#endif
+
 /* ---- co-simulation */
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
@@ -235,8 +283,15 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real h, fmi2Boolean fi
         m->known = m->known && !m->guessed[k];
     }
     refresh(m);
+    if (!steps_in(m, m->end, h))
+        return refused(m, "The communication step cannot be divided so that samples and their commands lie between two "
+                          "steps of the model: take the controller's period, a part or a multiple of it.");
     memcpy(m->carry, m->end, sizeof m->carry);
-    for (k = 0; k < PAIRS; ++k) {
+    for (k = RATES; k < PAIRS; ++k) {
+        m->input0[k] = m->input[k];
+        if (m->given[k]) m->input[k] += h * m->slope[k];
+    }
+    for (k = 0; k < RATES; ++k) {
         const int rate = PAIRS + k;
         const double now = m->input[k], v = m->input[rate];
         const double slope = m->h > 0.0 ? (now - m->input0[k]) / m->h : 0.0;

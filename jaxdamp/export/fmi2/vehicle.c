@@ -1,5 +1,6 @@
 /* A vehicle as the unit sees it: for each wheel an input, the height of the road, with its rate. */
 #define PAIRS MODEL_WHEELS
+#define RATES PAIRS
 #define OUTPUTS MODEL_OUTPUTS
 #define STATES MODEL_STATES
 #define CARRY MODEL_CARRY
@@ -36,11 +37,17 @@ static void advance(const model_parameters *p, const double *m, const double *u0
 static void observe(const model_parameters *p, const double *m, const double *x, const double *u, double *rate,
                     double *y) {
     UNUSED(p);
+#ifdef PERIOD
+    UNUSED(rate);
+#else
     model_state_rate(m, x, u, u + PAIRS, rate);
+#endif
     model_outputs(m, x, u, u + PAIRS, y);
 }
 
+#ifndef PERIOD
 static void observe_derivative(const model_parameters *p, const model_parameters *dp, const double *x, const double *dx,
                                const double *u, const double *du, double *drate, double *dy) {
     model_derivative(p, dp, x, dx, u, du, u + PAIRS, du + PAIRS, drate, dy);
 }
+#endif

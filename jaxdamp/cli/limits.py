@@ -1,0 +1,68 @@
+"""Limits of ride metrics and of parameters as a shop writes them: in SI, or in a unit of its own."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from jaxdamp import _checks
+from jaxdamp._display import display
+from jaxdamp._tables import typeset_unit
+from jaxdamp.bench import ratio
+from jaxdamp.cli.words import Bound, Limit, quantity
+from jaxdamp.parameters import match_paths, parameters
+from jaxdamp.vehicles import AbstractVehicle
+
+
+GRAVITY = {"g": "g_0"}  # of accelerations, where it is no gram
+
+
+def in_si(limits: Mapping[str, Limit], car: AbstractVehicle, *, white: bool) -> tuple[dict[str, Limit], list[str]]:
+    """Limits by short name or ride metric with their ends in SI; and what they are, where that is not as written.
+
+    Arguments:
+        limits: as `words.limit` reads them; None is no limit.
+        car: whose metrics they are of.
+        white: whether the road is white.
+
+    Raises:
+        ValueError: a word that is no metric of the car, a unit of something else.
+    """
+    units, found, said = {m.name: m.unit(car.units) for m in car.ride_metrics}, dict[str, Limit](), list[str]()
+    for word, span in limits.items():
+        _checks.one_of("limit", word, car.metric_words)
+        unit = units.get(car.goal_metrics(word, white=white)[0], "")
+        ends = span if isinstance(span, tuple) else (None, span)
+        si = (_in_si("limit", word, ends[0], unit), _in_si("limit", word, ends[1], unit))
+        found[word] = si if isinstance(span, tuple) else si[1]
+        shown, numbers = display().of(unit), [end for end in si if isinstance(end, float)]
+        if numbers and (si != ends or shown.unit != unit):
+            text = " to ".join(f"{shown(number):.4g}" for number in numbers)
+            said.append(f"Limit of {word}: {text} {typeset_unit(shown.unit)}".rstrip())
+    return found, said
+
+
+def bounds_in_si(bounds: Mapping[str, tuple[Bound, Bound]], models: Iterable[object]) -> dict[str, Any]:
+    """Bounds of parameters by path, last part or pattern, with their ends in SI.
+
+    Arguments:
+        bounds: as `words.bound` reads them.
+        models: whose parameters they are of; a bound without a unit may be of something else.
+
+    Raises:
+        ValueError: a unit of something else, or of no parameter.
+    """
+    with_unit = [name for name, span in bounds.items() if any(isinstance(end, str) for end in span)]
+    units = {p.path: p.unit for model in models if with_unit for p in parameters(model)}
+    of = {name: units[match_paths(list(units), [name])[0]] for name in with_unit}
+    return {name: tuple(_in_si("bound", name, end, of.get(name, "")) for end in span) for name, span in bounds.items()}
+
+
+def _in_si(option: str, word: str, end: Bound, unit: str) -> Bound:
+    """One end: a number in SI, or as it is if it is none or relative."""
+    stated = quantity(end) if isinstance(end, str) else None
+    if stated is None:
+        return end
+    number, written = stated
+    factor = ratio(GRAVITY.get(written, written) if unit == "m/s^2" else written, unit) if unit else None
+    if factor is None:
+        _checks.refuse(option, f"be in a unit of {word}, such as {unit or 'none'}", repr(end))
+    return number * factor

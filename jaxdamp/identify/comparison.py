@@ -1,0 +1,153 @@
+"""What comparisons of laws and of vehicles share: the recommended one, and fits side by side."""
+
+import dataclasses
+import functools
+import os
+from abc import abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from typing import ClassVar, Generic, TypeVar
+
+import jax
+import jax.numpy as jnp
+
+from jaxdamp._results import AbstractResult
+from jaxdamp._status import Status
+from jaxdamp._tables import Contents
+from jaxdamp.bench import BenchRun, RideRecord
+from jaxdamp.identify.recommending import Candidate, Recommendation, recommendation
+from jaxdamp.identify.rungs import Failure
+
+
+MOST_THREADS = 4  # fits side by side: more of them wait for Python's lock
+
+R = TypeVar("R", bound=Candidate)
+D = TypeVar("D", BenchRun, RideRecord)
+C = TypeVar("C", bound="AbstractComparison")  # not `Self`, which run-time type checks refuse
+Start = TypeVar("Start")
+Outcome = TypeVar("Outcome")
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class AbstractComparison(AbstractResult, Generic[R, D]):
+    """Laws or vehicles fitted to the same records, in the order given.
+
+    Attributes:
+        rungs: those that were fitted, with their errors.
+        held_out: the records or drives scored on, not fitted; empty if parts of the fitted ones were held out.
+        failed: those without a fit, and why.
+        kind: what is compared, in a word.
+    """
+
+    rungs: tuple[R, ...]
+    held_out: tuple[D, ...] = ()
+    failed: tuple[Failure, ...] = ()
+    kind: ClassVar[str]
+
+    @classmethod
+    def of(cls: type[C], outcomes: Iterable[R | Failure], held_out: Iterable[D] = ()) -> C:
+        """The comparison of the outcomes of fits.
+
+        Raises:
+            ValueError: nothing could be fitted.
+        """
+        outcomes = tuple(outcomes)
+        failed = tuple(one for one in outcomes if isinstance(one, Failure))
+        rungs = tuple(one for one in outcomes if not isinstance(one, Failure))
+        if not rungs:
+            reasons = list(dict.fromkeys(failure.reason for failure in failed))
+            texts = reasons if len(reasons) == 1 else [f"{failure.name}: {failure.reason}" for failure in failed]
+            one = f"The {cls.kind} {failed[0].name} could not" if len(failed) == 1 else ""
+            raise ValueError(f"{one or f'None of {len(failed)} {cls.kind}s could'} be fitted. {' '.join(texts)}")
+        return cls(rungs, tuple(held_out), failed)
+
+    @property
+    @abstractmethod
+    def verdict(self) -> tuple[str, ...]:
+        """Sentences on the recommended one and why it is this one."""
+
+    @abstractmethod
+    def held_out_errors(self, rung: R) -> Contents:
+        """The errors of one on motion held out, as plain data."""
+
+    @property
+    def summary(self) -> str:
+        """The recommended one and its errors: the first sentence of the verdict."""
+        return self.verdict[0]
+
+    def content(self) -> Contents:
+        """All fits as numbers with units and words, ready for JSON; numbers that are not finite are None."""
+        return {
+            "best": self.best.name,
+            "best_fit": self.best_fit.name,
+            "verdict": list(self.verdict),
+            "held_out": [record.name for record in self.held_out],
+            f"{self.kind}s": {
+                rung.name: {**rung.result.to_dict(), **self.held_out_errors(rung)} for rung in self.rungs
+            },
+            "failed": {failure.name: failure.reason for failure in self.failed},
+        }
+
+    @functools.cached_property
+    def recommendation(self) -> Recommendation[R]:
+        """The recommended one, those that predict as well, and those left aside."""
+        return recommendation(self.rungs)
+
+    @property
+    def best(self) -> R:
+        """The recommended one: the simplest that predicts motion held out as well as any, within the noise.
+
+        It has no numbers at bounds or not identifiable, and its search converged, where another is as good
+        (`recommendation`).
+        """
+        return self.recommendation.rung
+
+    @property
+    def best_fit(self) -> R:
+        """The one with the smallest error on the fitted records, however many numbers it needs."""
+        return min(self.rungs, key=lambda rung: rung.rmse)
+
+    @property
+    def status(self) -> Status:
+        """How the search of the recommended one ended."""
+        return self.best.result.status
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The warnings of all fits, which concern the records, such as contradicting records."""
+        first, *others = (rung.result.warnings for rung in self.rungs)
+        return tuple(warning for warning in first if all(warning in warnings for warnings in others))
+
+    def rung(self, name: str) -> R:
+        """The one of that name.
+
+        Raises:
+            KeyError: an unknown name, or one that has no fit.
+        """
+        for rung in self.rungs:
+            if rung.name == name:
+                return rung
+        why = "".join(f" {failure.name} failed: {failure.reason}" for failure in self.failed if failure.name == name)
+        names = ", ".join(rung.name for rung in self.rungs)
+        raise KeyError(f"No {self.kind} is named {name!r}; there are {names}.{why}")
+
+
+def side_by_side(
+    fitted: Callable[[str, Start], Outcome], starts: Mapping[str, Start], progress: Callable[[str], None]
+) -> Iterator[Outcome]:
+    """The outcome of each start in their order, as soon as it is available, several in threads at the same time."""
+    # A thread begins with the precision of the process, not with that of its caller.
+    double = jnp.result_type(float) == jnp.float64
+
+    def in_precision(name: str, start: Start) -> Outcome:
+        with jax.enable_x64(double):
+            return fitted(name, start)
+
+    pool = ThreadPoolExecutor(max_workers=min(os.cpu_count() or 1, MOST_THREADS))
+    try:
+        waiting = {name: pool.submit(in_precision, name, start) for name, start in starts.items()}
+        for name, outcome in waiting.items():
+            progress(name)
+            yield outcome.result()
+    finally:
+        pool.shutdown(cancel_futures=True)

@@ -1,0 +1,227 @@
+"""Simpler laws: what a law becomes without the parts and numbers that the records do not determine."""
+
+import dataclasses
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxdamp.dampers import (
+    AbstractDamper,
+    AbstractWrapper,
+    PiecewiseLinear,
+    StandardError,
+    Sum,
+    laws_inside,
+    with_standard_errors,
+)
+from jaxdamp.identify.recommending import NEARLY, judged_on_held_out, recommendation
+from jaxdamp.identify.rungs import Failure, Rung
+from jaxdamp.parameters import nonnegative, parameters, with_values
+
+
+MOST_FAILURES = 3  # simpler laws that predict worse, before the search for one ends
+LOSS = 1.02  # times the error of the whole law: what is not determined is hardly missed
+MOST_LAWS = 2  # that are to become simpler
+
+Fitted = Callable[[Rung, AbstractDamper, tuple[str, ...]], Rung | Failure]
+
+
+class Simpler(NamedTuple):
+    """A law with less in it than another.
+
+    Attributes:
+        law: to start from.
+        words: what it lacks.
+        weak: how many of the numbers that it lacks were not determined.
+        share: of these among the numbers that it lacks.
+    """
+
+    law: AbstractDamper
+    words: str
+    weak: int
+    share: float
+
+
+def simpler_laws(law: AbstractDamper, weak: Sequence[str], fastest: float, path: str = "") -> Iterator[Simpler]:
+    """What a law becomes where one part that holds undetermined numbers is left out, or is replaced by a simpler one.
+
+    A term of a sum and a wrapper (lag, series spring, clearance) are left out; a number that may be zero is zero; a
+    curve becomes one of fewer numbers; friction with breakaway, with a shape or with several elements becomes a viscous
+    force beside friction that follows the velocity, `CoulombFriction`, and elastic friction, `Dahl`.
+
+    Arguments:
+        law: the law, or a part of one.
+        weak: paths of the undetermined numbers, for vectors once for each number.
+        fastest: largest velocity [m/s] of the records.
+        path: prefix of the paths of this part.
+
+    >>> from jaxdamp.dampers import CoulombFriction, Lag, Linear
+    >>> law = Lag(Linear(1500.0) + CoulombFriction(20.0, 0.02), 0.005)
+    >>> [simpler.words for simpler in simpler_laws(law, ["lag_time", "law.terms.1.friction_force"], 0.5)]
+    ['with Linear + CoulombFriction for Lag(Linear + CoulombFriction)', 'without CoulombFriction']
+    """
+    own = [name for name in weak if name.startswith(path)]
+    if not own:
+        return
+    if isinstance(law, Sum):
+        yield from _of_sum(law, own, fastest, path)
+    elif isinstance(law, AbstractWrapper):
+        yield from _of_wrapper(law, own, fastest, path)
+    else:
+        plain = law.plainer([name.removeprefix(path) for name in own], fastest)
+        if plain is not None:
+            held = held_of(plain, fastest)
+            words = f"with {_in_words(plain)} for {_in_words(law)}" + f", {', '.join(held)} held" * bool(held)
+            yield Simpler(plain, words, len(own), len(own) / (_size(law) - _size(plain) + len(held)))
+        yield from _at_zero(law, own, path)
+
+
+def _of_sum(law: Sum, weak: Sequence[str], fastest: float, path: str) -> Iterator[Simpler]:
+    """Without one of its terms, or with a simpler one."""
+    for i, term in enumerate(law.terms):
+        place, before, after = f"{path}terms.{i}.", law.terms[:i], law.terms[i + 1 :]
+        inside = [name for name in weak if name.startswith(place)]
+        rest = before + after
+        if rest and inside:
+            less = rest[0] if len(rest) == 1 else Sum(rest)
+            yield Simpler(less, f"without {_in_words(term)}", len(inside), len(inside) / _size(term))
+        for part in simpler_laws(term, inside, fastest, place):
+            instead = part.law.terms if isinstance(part.law, Sum) else (part.law,)
+            if any(np.any(p.value) for p in parameters(part.law)):
+                yield part._replace(law=Sum((*before, *instead, *after)))
+
+
+def _of_wrapper(law: AbstractWrapper, weak: Sequence[str], fastest: float, path: str) -> Iterator[Simpler]:
+    """The law inside alone, a simpler one inside, or the wrapper without a number of its own."""
+    inner = law.inner_law()
+    field = next(f.name for f in dataclasses.fields(law) if getattr(law, f.name) is inner)
+    inside = [name for name in weak if name.startswith(f"{path}{field}.")]
+    own = [name for name in weak if name not in inside]
+    if own:
+        words = f"with {_in_words(inner)} for {_in_words(law)}"
+        yield Simpler(inner, words, len(own), len(own) / (_size(law) - _size(inner)))
+    for part in simpler_laws(inner, inside, fastest, f"{path}{field}."):
+        yield part._replace(law=dataclasses.replace(law, **{field: part.law}))
+    yield from _at_zero(law, own, path)
+
+
+def _at_zero(law: AbstractDamper, weak: Sequence[str], path: str) -> Iterator[Simpler]:
+    """With a number at zero that may be zero."""
+    for p in parameters(law):
+        if p.domain is nonnegative and f"{path}{p.path}" in weak:
+            zero = with_values(law, {p.path: np.zeros(np.shape(p.value))})
+            yield Simpler(zero, f"with {p.path} = 0", np.size(p.value), 1.0)
+
+
+def _size(law: AbstractDamper) -> int:
+    return sum(np.size(p.value) for p in parameters(law))
+
+
+def held_of(law: AbstractDamper, fastest: float) -> tuple[str, ...]:
+    """Paths of the numbers that are not fitted: at zero where they may be, or without effect.
+
+    Arguments:
+        law: a law made simpler.
+        fastest: largest velocity [m/s] of the records.
+    """
+    zero = [p.path for p in parameters(law) if p.domain is nonnegative and not np.any(p.value)]
+    return *zero, *(place + name for place, part in laws_inside(law) for name in part.without_effect(fastest))
+
+
+def reduced(rungs: Sequence[Rung], fitted: Fitted, progress: Callable[[str], None]) -> Iterator[Rung]:
+    """A law all of whose numbers are determined, in place of one recommended in spite of doubt or left aside for it.
+
+    Parts with undetermined numbers are left out one after the other, while the error on motion held out stays within
+    2 % of that of the whole law, and within 10 % of the smallest. The recommended law is tried first, then, if doubt
+    remains, the one with the smallest error; a law without doubt that is only within the 10 % is the last resort. Where
+    a law without doubt would be recommended, one that predicts better by more than these 2 % is tried.
+
+    Arguments:
+        rungs: the laws.
+        fitted: fits and judges a law made simpler from a rung, with numbers to be held.
+        progress: called with the name of each law that is made simpler.
+    """
+    best = recommendation(rungs).rung
+    judged = sorted(judged_on_held_out(rungs), key=lambda rung: rung.error)
+    near, floor, found = NEARLY * judged[0].error, best.floor, list[Rung]()
+    doubted = [rung for rung in judged if rung is not best and rung.error <= near and rung.doubt]
+    sources = [best, *doubted] if best.doubt else [rung for rung in doubted[:1] if LOSS * rung.error < best.error]
+    if len(rungs) < 2 or best.held_out_rmse is None:
+        return
+    for source in sources[:MOST_LAWS]:
+        progress(source.name)
+        as_well = max(min(near, LOSS * source.error), floor)
+        rung = _without_doubt(source, as_well, max(near, floor) if best.doubt else as_well, fitted)
+        found += [rung] if rung else []
+        if rung and rung.error <= as_well:
+            break
+    yield from sorted(found, key=lambda rung: rung.error)[:1]
+
+
+def _without_doubt(source: Rung, enough: float, most: float, fitted: Fitted) -> Rung | None:
+    """The law with less in it, all of whose numbers are determined, if one predicts as well or nearly as well."""
+    at, left_out, failed, nearly = source, list[str](), set[str](), None
+    while at.doubt and len(failed) < MOST_FAILURES:
+        law, weak, fastest = _doubtful(at)
+        options = [part for part in simpler_laws(law, weak, fastest) if part.words not in failed]
+        if options:
+            part = max(options, key=lambda part: (part.share, part.weak))
+            rung = _fitted_with_less(source, part.law, fastest, fitted)
+            if rung and not rung.doubt and rung.error <= most:
+                nearly, most = rung, rung.error
+            if rung and rung.error <= enough:
+                at, left_out = rung, [*left_out, part.words]
+            else:
+                failed.add(part.words)
+        elif left_out:
+            at, left_out, failed = source, [], {*failed, left_out[0]}  # another way
+        else:
+            break
+    return nearly
+
+
+def _fitted_with_less(source: Rung, law: AbstractDamper, fastest: float, fitted: Fitted) -> Rung | None:
+    """The fit of a law with less in it, which says what it is, and that no record determines what is held."""
+    law = without_zero_terms(law)
+    held = held_of(law, fastest)
+    rung = fitted(source, law, held)
+    if isinstance(rung, Failure):
+        return None
+    law = rung.result.law
+    at = [p for p in parameters(law) if p.path in held]
+    words = ", ".join(f"{p.path.rpartition('.')[2]} = {np.max(p.value):.3g}" for p in at)
+    reduced = f"{source.name} reduced to {_in_words(law)}{f' with {words}' * bool(words)}"
+    unknown = [StandardError(p.path, np.inf, p.unit, identified=False) for p in at]
+    law = with_standard_errors(law, [*law.standard_errors, *unknown])
+    result = dataclasses.replace(rung.result, law=law)
+    return rung._replace(name=f"{source.name}_reduced", result=result, held=held, reduced=reduced)
+
+
+def without_zero_terms(law: AbstractDamper) -> AbstractDamper:
+    """A sum without terms all of whose numbers are zero, which give no force; other laws as they are.
+
+    Arguments:
+        law: any law.
+    """
+    if not isinstance(law, Sum):
+        return law
+    terms = [term for term in law.terms if any(np.any(p.value) for p in parameters(term))]
+    return terms[0] if len(terms) == 1 else Sum(tuple(terms)) if terms else law
+
+
+def _doubtful(rung: Rung) -> tuple[AbstractDamper, list[str], float]:
+    """The law, the paths of its numbers that are in doubt, and the largest velocity of the records."""
+    result = rung.result
+    place = "law." if result.rig is not None or result.record_starts else ""
+    noted = [e.name.removeprefix(place) for e in result.parameters if e.note and e.name.startswith(place)]
+    return result.law, [name.partition("[")[0] for name in noted], max(run.peak_velocity for run in result.runs)
+
+
+def _in_words(law: AbstractDamper) -> str:
+    """Of what a law is made, such as "Lag(Linear) + Spring"."""
+    if isinstance(law, Sum):
+        return " + ".join(map(_in_words, law.terms))
+    inner = f"({_in_words(law.inner_law())})" if isinstance(law, AbstractWrapper) else ""
+    knees = f" with {law.knots.size} knees" if isinstance(law, PiecewiseLinear) else ""
+    return f"{type(law).__name__}{inner}{knees}"

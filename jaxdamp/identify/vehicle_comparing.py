@@ -1,0 +1,252 @@
+"""`compare` of vehicles: forms of one vehicle fitted to the same drives, judged on drives left out."""
+
+import dataclasses
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp._progress import Progress
+from jaxdamp._results import drawn_by
+from jaxdamp._tables import Cell, Column, Contents, Table, with_unit
+from jaxdamp.bench import RideRecord
+from jaxdamp.identify.comparison import AbstractComparison, side_by_side
+from jaxdamp.identify.model import VehicleTest
+from jaxdamp.identify.recommending import doubt_of, why
+from jaxdamp.identify.rungs import Failure
+from jaxdamp.identify.vehicle_fitting import fit_vehicle
+from jaxdamp.identify.vehicle_held_out import on_drives, without_drives
+from jaxdamp.identify.vehicle_preparing import checked_records
+from jaxdamp.identify.vehicle_result import ChannelScore, VehicleFit
+from jaxdamp.parameters import matching, parameters
+from jaxdamp.vehicles import AbstractVehicle
+
+
+EXACT = 1e-4  # of the standard deviation of a channel: smaller errors are all alike
+NAMED = ("over", "freeze", "per_record", "bounds", "priors", "tie")  # options that name parameters
+
+Names = str | Sequence[str] | Mapping[str, object] | None
+
+
+class VehicleRung(NamedTuple):
+    """One vehicle of a comparison.
+
+    Errors of all channels are taken together as multiples of the smallest error that any of the vehicles leaves in a
+    channel of the fitted drives: 1 is as good as the best.
+
+    Attributes:
+        name: of the vehicle.
+        result: the fit of all drives.
+        scores: of each channel of each drive, or part of a drive, that was left out.
+        judged_on: what was left out, in words.
+        noise: smallest RMS error of each channel that any of the vehicles leaves, in its unit.
+    """
+
+    name: str
+    result: VehicleFit
+    scores: tuple[ChannelScore, ...]
+    judged_on: str
+    noise: Mapping[str, float] = {}  # in the unit of each channel
+
+    @property
+    def parameters(self) -> int:
+        """Number of free parameters."""
+        return len(self.result.parameters)
+
+    numbers = parameters
+
+    @property
+    def rmse(self) -> float:
+        """RMS over channels and drives, on those fitted, as a multiple of the noise of each channel."""
+        return self._level(score for score in self.result.scores if score.channel in self.noise)
+
+    @property
+    def held_out_rmse(self) -> float:
+        """The same on drives, or parts of drives, left out."""
+        return self._level(self.scores)
+
+    error = held_out_rmse
+    floor = 0.0  # that of `EXACT` is in the noise
+
+    @property
+    def errors(self) -> tuple[float, ...]:
+        """The same on each drive or part of a drive that was left out."""
+        names = dict.fromkeys(score.record for score in self.scores)
+        return tuple(self._level(score for score in self.scores if score.record == name) for name in names)
+
+    @property
+    def fit_percent(self) -> float:
+        """Mean over channels and drives, on those fitted [%]."""
+        return float(np.mean([score.fit_percent for score in self.result.scores if score.channel in self.noise]))
+
+    @property
+    def held_out_fit_percent(self) -> float:
+        """The same on drives, or parts of drives, left out [%]."""
+        return float(np.mean([score.fit_percent for score in self.scores]))
+
+    @property
+    def doubt(self) -> str:
+        """Why its numbers cannot be believed, in words; empty for a converged fit that determines every number."""
+        return doubt_of(self.result)
+
+    def _level(self, scores: Iterable[ChannelScore]) -> float:
+        return float(np.sqrt(np.mean([max(score.rmse / self.noise[score.channel], EXACT) ** 2 for score in scores])))
+
+    def scores_table(self) -> Table:
+        """The error of each channel of each drive, or part of a drive, that was left out."""
+        columns = (Column("left out"), Column("channel"), Column("unit"), Column("RMSE", spec=".3g"))
+        columns += (Column("fit", "%", ".1f"), Column("largest error", spec=".3g"))
+        return Table(f"Errors of {self.name}: {self.judged_on}", columns, tuple(tuple(s)[:-1] for s in self.scores))
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class VehicleComparison(AbstractComparison[VehicleRung, RideRecord]):
+    """Vehicles fitted to the same drives, in the order given."""
+
+    kind: ClassVar[str] = "vehicle"
+
+    @classmethod
+    def of(cls, outcomes: Iterable[VehicleRung | Failure], held_out: Iterable[RideRecord] = ()) -> "VehicleComparison":
+        """The comparison of the outcomes of `fit_each_vehicle`, each with the noise that the best of them leaves.
+
+        Raises:
+            ValueError: no vehicle could be fitted.
+        """
+        outcomes = tuple(outcomes)
+        noise = _smallest([one for one in outcomes if isinstance(one, VehicleRung)])
+        with_noise = [one._replace(noise=noise) if isinstance(one, VehicleRung) else one for one in outcomes]
+        return super().of(with_noise, held_out)
+
+    def __getitem__(self, name: str) -> VehicleFit:
+        """The fit of the vehicle of that name."""
+        return self.rung(name).result
+
+    @property
+    def verdict(self) -> tuple[str, ...]:
+        """Sentences on the recommended vehicle and why it is this one."""
+        best = self.best
+        lead = f"Recommended: {best.name}" if len(self.rungs) > 1 else f"Error of {best.name}"
+        text = (
+            f"{lead}, held-out fit {best.held_out_fit_percent:.1f} %, RMS error {best.error:.3g} times the smallest"
+            f" that any vehicle leaves in the fitted drives ({best.judged_on})."
+        )
+        return (text, *why(self.recommendation, self.rungs, self.kind))
+
+    def table(self) -> Table:
+        """Each vehicle with its number of free parameters, its errors and remarks."""
+        columns = [Column("vehicle"), Column("free", spec="d"), Column("fit", "%", ".1f"), Column("error", spec=".3g")]
+        columns += [Column("held-out fit", "%", ".1f"), Column("held-out error", spec=".3g"), Column("note")]
+        rows: list[tuple[Cell, ...]] = []
+        for r in self.rungs:
+            note = ", ".join(filter(None, ["recommended" * (r is self.best), r.doubt]))
+            errors = r.fit_percent, r.rmse, r.held_out_fit_percent, r.held_out_rmse
+            rows.append((r.name, r.parameters, *errors, note))
+        rows += [(failure.name, *[None] * (len(columns) - 2), "failed") for failure in self.failed]
+        title = "Vehicles (errors as multiples of the smallest that any of them leaves in the fitted drives)"
+        return Table(title, tuple(columns), tuple(rows))
+
+    def held_out_errors(self, rung: VehicleRung) -> Contents:
+        """The errors of a vehicle on drives left out, as plain data."""
+        errors = {"held_out_fit": (rung.held_out_fit_percent, "%"), "held_out_error": (rung.held_out_rmse, "")}
+        return {name: with_unit(*error) for name, error in errors.items()}
+
+    plot = drawn_by("ladder", "The errors of the vehicles side by side.")
+
+    def __repr__(self) -> str:
+        lines = [f"{'vehicle':<24}{'free':>5}{'fit %':>8}{'error':>9}{'held-out %':>12}{'error':>9}"]
+        for r in self.rungs:
+            line = f"{r.name:<24}{r.parameters:>5}{r.fit_percent:>8.1f}{r.rmse:>9.3g}"
+            lines.append(f"{line}{r.held_out_fit_percent:>12.1f}{r.held_out_rmse:>9.3g}  {r.doubt}".rstrip())
+        lines += [f"{failure.name:<24} failed: {failure.reason}" for failure in self.failed]
+        return "\n".join([*lines, " ".join(self.verdict), f"best: {self.best.name}"])
+
+
+def _smallest(rungs: Sequence[VehicleRung]) -> dict[str, float]:
+    """The smallest RMS error of each channel of the fitted drives that any of the vehicles leaves, in its unit."""
+    errors: dict[str, list[float]] = {}
+    for rung in rungs:
+        for channel in dict.fromkeys(c for ride in rung.result.records for c in ride.channels):
+            own = [score.rmse for score in rung.result.scores if score.channel == channel]
+            errors.setdefault(channel, []).append(float(np.sqrt(np.mean(np.square(own)))))
+    level = {c: np.std(np.concatenate([r[c] for r in rungs[0].result.records if c in r.channels])) for c in errors}
+    return {channel: max(min(own), EXACT * float(level[channel])) for channel, own in errors.items()}
+
+
+def compare_vehicles(
+    vehicles: Mapping[str, AbstractVehicle],
+    records: RideRecord | Iterable[RideRecord],
+    *,
+    held_out: RideRecord | Iterable[RideRecord] = (),
+    progress: Callable[[str], None] | None = None,
+    **options: Any,
+) -> VehicleComparison:
+    """`compare` of vehicles on records of their motion.
+
+    Arguments:
+        vehicles: starts by name.
+        records: drives to fit.
+        held_out: drives to judge on, which are not fitted, instead of `records` in turn.
+        progress: called with each name before its fit; a line in the terminal if it is left out.
+        options: passed on to `fit_vehicle`; names of parameters that only some of the vehicles have concern these.
+
+    Raises:
+        ValueError: no vehicles, or none that could be fitted.
+    """
+    held = (held_out,) if isinstance(held_out, RideRecord) else tuple(held_out)
+    with Progress("Fitting") as shown:
+        outcomes = fit_each_vehicle(vehicles, records, held, progress=progress or shown, **options)
+        return VehicleComparison.of(outcomes, held)
+
+
+def fit_each_vehicle(
+    vehicles: Mapping[str, AbstractVehicle],
+    records: RideRecord | Iterable[RideRecord],
+    held_out: Sequence[RideRecord] = (),
+    *,
+    progress: Callable[[str], None] = lambda name: None,
+    **options: Any,
+) -> Iterator[VehicleRung | Failure]:
+    """Fit the vehicles of a comparison; yields each result or failure in their order, as soon as it is available.
+
+    Arguments:
+        vehicles: starts by name.
+        records: drives to fit.
+        held_out: drives to judge on, as in `compare`.
+        progress: called with each name before its result is waited for.
+        options: passed on to `fit_vehicle`.
+    """
+    rides = (records,) if isinstance(records, RideRecord) else tuple(records)
+    for name, vehicle in vehicles.items():
+        must = "be a vehicle, as the others are"
+        _checks.instance(f"laws[{name!r}]", vehicle, AbstractVehicle, must, "Laws are compared on bench records.")
+        checked_records(vehicle, (*rides, *held_out))
+    sensors = dict(options.get("sensors") or {})
+    tests = {name: VehicleTest(vehicle, sensors) for name, vehicle in vehicles.items()}
+    known = {name: [p.path for p in parameters(test)] for name, test in tests.items()}
+
+    def fitted(name: str, vehicle: AbstractVehicle) -> VehicleRung | Failure:
+        own: dict[str, Any] = dict(options)
+        own.update((key, _of(known[name], known.values(), own[key])) for key in NAMED if key in own)
+        try:
+            result = fit_vehicle(vehicle, rides, **own)
+            judged = on_drives(result, held_out) if held_out else without_drives(result)
+        except (ValueError, ArithmeticError) as error:
+            return Failure(name, str(error))
+        return VehicleRung(name, result, *judged)
+
+    yield from side_by_side(fitted, vehicles, progress)
+
+
+def _of(own: Sequence[str], every: Iterable[Sequence[str]], names: Names) -> Names:
+    """The names of parameters that this vehicle has, or none of the vehicles, which its fit then refuses."""
+    if names is None:
+        return None
+    every = [*every]
+
+    def counts(name: str) -> bool:
+        return bool(matching(own, name)) or not any(matching(paths, name) for paths in every)
+
+    if isinstance(names, Mapping):
+        return {name: value for name, value in names.items() if counts(name)}
+    return [name for name in ([names] if isinstance(names, str) else names) if counts(name)]

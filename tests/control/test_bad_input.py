@@ -1,0 +1,92 @@
+"""What a controller cannot do is refused or said, by names, values and remedies."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxdamp import Ride, roads, simulate
+from jaxdamp.control import AbstractPolicy, Controlled, RateLimit, Skyhook, StateFeedback
+from jaxdamp.dampers import Linear, Scheduled
+from jaxdamp.vehicles import Corner, HalfCar, QuarterCar
+
+
+DAMPER = Scheduled((Linear(300.0), Linear(3900.0)), levels=[0.0, 1.0], command=0.25)
+HALF = HalfCar(700.0, 1200.0, 1.2, 1.5, Corner(40.0, 18e3, 200e3, DAMPER), Corner(45.0, 22e3, 200e3, DAMPER))
+QUARTER = QuarterCar(400.0, 50.0, 20e3, 250e3, DAMPER)
+ROAD = roads.iso8608("C", speed=20.0, seed=1, duration=4.0)
+
+
+def quarter(damper):
+    return QuarterCar(400.0, 50.0, 20e3, 250e3, damper)
+
+
+class Root(AbstractPolicy):
+    """A policy that is no number where the body falls."""
+
+    def __call__(self, seen, state):
+        return 3000.0 * jnp.sqrt(seen.body_velocity), state
+
+
+def test_a_policy_that_gives_no_number_is_named_with_damper_and_time():
+    both = Controlled(HALF, {"front_damper": Skyhook(), "rear_damper": Root()})
+    with pytest.raises(
+        ValueError, match=r"`policy \(Root\)` must demand finite forces, but is nan N for rear_damper at"
+    ):
+        simulate(both, ROAD, duration=0.5)
+    values = Ride(Controlled(QUARTER, Root()), ROAD, metrics=["rms_sprung_acceleration"], duration=0.5)()
+    assert np.isnan(values["rms_sprung_acceleration"])  # of many points in a sweep, one is a value
+
+
+def test_a_vehicle_that_diverges_by_itself_does_not_blame_the_policy():
+    car = Controlled(QUARTER, StateFeedback(velocity=1.0))
+    with pytest.raises(ValueError, match="`vehicle` must have a finite response"):
+        simulate(car, ROAD, duration=0.5, start={"z_sprung": 1e308})
+
+
+def test_commands_that_stay_at_a_limit_are_said():
+    weak = Scheduled((Linear(300.0), Linear(400.0)), levels=[0.0, 2.0], command=0.5)
+    hard = simulate(Controlled(quarter(weak), StateFeedback(velocity=1e6)), ROAD, duration=1.0)
+    assert len(hard.notes) == 1 and hard.notes[0].startswith(
+        "The command of the damper stood at its highest level, 2, 9"
+    )
+    slow = simulate(Controlled(QUARTER, Skyhook(), rate_limit=RateLimit(3.0, 3.0)), ROAD, duration=1.0)
+    assert len(slow.notes) == 1 and "changed as fast as its actuator can, 3 up and 3 down per second" in slow.notes[0]
+    assert not simulate(Controlled(QUARTER, Skyhook(), rate_limit=RateLimit(100.0, 100.0)), ROAD, duration=1.0).notes
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (
+            lambda: simulate(_delayed(0.5), ROAD, duration=0.5),
+            "`delay` must be shorter than the run of 0.5 s, but is 0.5 s",
+        ),
+        (lambda: Ride(_delayed(2.0), ROAD, duration=1.0), "No command of the controller would be applied"),
+        (lambda: Ride(_delayed(0.0), ROAD, duration=1.0)({"car.damper.levels.1": 2.0}), "levels"),
+        (lambda: _command(1.5), "`command` must be between the levels 0 and 1, but is 1.5"),
+        (lambda: Controlled(quarter(Linear(1e3)), Skyhook()), "which takes a command"),
+        (
+            lambda: simulate(Controlled(QUARTER, Skyhook(), period=7.5e-4), ROAD, duration=1.0),
+            "`period` must be a whole",
+        ),
+    ],
+    ids=["delay", "delay of a ride", "levels are no parameter", "command", "no command", "period"],
+)
+def test_what_cannot_be_controlled_is_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_a_part_of_a_run_may_be_shorter_than_the_delay():
+    whole = simulate(_delayed(0.1), ROAD, duration=0.3)
+    _, state = simulate(_delayed(0.1), ROAD, duration=0.05, return_state=True)
+    rest = simulate(_delayed(0.1), ROAD, duration=0.25, state=state)
+    np.testing.assert_allclose(rest["damper_command"], whole["damper_command"][50:], rtol=1e-9)
+
+
+def _delayed(delay):
+    return Controlled(QUARTER, Skyhook(), delay=delay)
+
+
+def _command(command):
+    return Controlled(quarter(Scheduled(DAMPER.laws, levels=[0.0, 1.0], command=command)), Skyhook())
