@@ -149,7 +149,7 @@ def _types(names: Names) -> list[str]:
         place = [f".. py:currentmodule:: {module}", ""]
         if not isinstance(value, ast.ClassDef):
             short += [*place, f".. py:type:: {word}", f"   :canonical: {names.linked(value, module)}", ""]
-        elif isinstance(getattr(import_module(module), word, None), type):
+        elif getattr(getattr(import_module(module), word, None), "__module__", "") == module:
             classes += [f".. autoclass:: {name}", ""]
         else:  # for type checkers only
             short += [*place, f".. py:type:: {word}", "", f"   {ast.get_docstring(value)}", ""]

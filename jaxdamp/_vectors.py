@@ -20,10 +20,10 @@ from jaxdamp._types import Scalar, ScalarLike
 
 # One array or a tuple of scalars, rows of them for a matrix, as `MemoryLayout` says.
 if TYPE_CHECKING:
-    Vector: TypeAlias = Any
+    SmallVector: TypeAlias = Any
     Matrix: TypeAlias = Any
 else:
-    Vector = Float[Array, " _"] | tuple[Scalar, ...]
+    SmallVector = Float[Array, " _"] | tuple[Scalar, ...]
     Matrix = Float[Array, "_ _"] | tuple[tuple[Scalar, ...], ...]
 
 
@@ -60,24 +60,24 @@ def laid_out(values: Array, layout: MemoryLayout) -> Any:
     return scalars(values) if values.ndim == 1 else rows(values)
 
 
-def times(matrix: Matrix, vector: Vector) -> Vector:
+def times(matrix: Matrix, vector: SmallVector) -> SmallVector:
     """Matrix @ vector as products and sums, which XLA fuses with other operations, unlike a `dot`."""
     if isinstance(matrix, tuple):
         return tuple(_dot(row, vector) for row in matrix)
     return jnp.sum(matrix * jnp.asarray(vector)[None, :], axis=1)
 
 
-def plus(*vectors: Vector) -> Vector:
+def plus(*vectors: SmallVector) -> SmallVector:
     """The sum."""
     return _entrywise(lambda *entries: _sum(entries), *vectors)
 
 
-def minus(one: Vector, other: Vector) -> Vector:
+def minus(one: SmallVector, other: SmallVector) -> SmallVector:
     """The difference."""
     return _entrywise(operator.sub, one, other)
 
 
-def materialise_once(vector: Vector, opaque_one: Scalar | None) -> Vector:
+def materialise_once(vector: SmallVector, opaque_one: Scalar | None) -> SmallVector:
     """The same vector, which the compiler computes once and does not repeat in every expression that uses it.
 
     XLA writes what goes into several sums anew in each of them, but not a quotient: scalars are divided by 1.0, whose
@@ -86,7 +86,7 @@ def materialise_once(vector: Vector, opaque_one: Scalar | None) -> Vector:
     return tuple(entry / opaque_one for entry in vector) if opaque_one is not None else vector
 
 
-def materialise_derivatives_once(vector: Vector, opaque_one: Scalar | None) -> Vector:
+def materialise_derivatives_once(vector: SmallVector, opaque_one: Scalar | None) -> SmallVector:
     """The same, its tangents and cotangents computed once: a quarter to a third less for many cars in reverse."""
     if opaque_one is None:
         return vector
@@ -105,18 +105,18 @@ def _divide(primals: tuple[Scalar, Scalar], tangents: tuple[Scalar, Scalar]) -> 
     return entry, change / opaque_one
 
 
-def between(one: Vector, other: Vector, share: ScalarLike) -> Vector:
+def between(one: SmallVector, other: SmallVector, share: ScalarLike) -> SmallVector:
     """The point at a share of the way from one to the other."""
     return _entrywise(lambda a, b: a + share * (b - a), one, other)
 
 
-def _entrywise(function: Callable[..., Any], *vectors: Vector) -> Vector:
+def _entrywise(function: Callable[..., Any], *vectors: SmallVector) -> SmallVector:
     if isinstance(vectors[0], tuple):
         return tuple(function(*entries) for entries in zip(*vectors, strict=True))
     return function(*vectors)
 
 
-def _dot(row: Sequence[Scalar], vector: Vector) -> Scalar:
+def _dot(row: Sequence[Scalar], vector: SmallVector) -> Scalar:
     return _sum([a * b for a, b in zip(row, vector, strict=True)])
 
 

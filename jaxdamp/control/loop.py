@@ -18,7 +18,7 @@ from jaxtyping import Array, Float, PyTree
 from jaxdamp import _checks
 from jaxdamp._limits import within
 from jaxdamp._types import Scalar, ScalarLike
-from jaxdamp._vectors import Matrix, MemoryLayout, Vector, laid_out, scalars, times
+from jaxdamp._vectors import Matrix, MemoryLayout, SmallVector, laid_out, scalars, times
 from jaxdamp.codegen import is_printing
 from jaxdamp.control.actuator import RateLimit, decay
 from jaxdamp.control.levels import forces_at, interpolated, laws_at_levels, scheduled_in
@@ -231,7 +231,11 @@ class Sampler(eqx.Module):
         return ControlState(signals, states, (zero,) * len(command), waiting, command, command, filters)
 
     def signals(
-        self, motion: Vector, force: Vector, road: tuple[Vector, Vector | None], at_ports: tuple[Vector, Vector]
+        self,
+        motion: SmallVector,
+        force: SmallVector,
+        road: tuple[SmallVector, SmallVector | None],
+        at_ports: tuple[SmallVector, SmallVector],
     ) -> tuple[Signals, ...]:
         """What the sensors see of each damper."""
         position, rates = motion[: len(motion) // 2], motion[len(motion) // 2 :]

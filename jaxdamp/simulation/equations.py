@@ -9,7 +9,7 @@ from jax.ad_checkpoint import checkpoint_name
 from jaxtyping import Array, Float, PyTree
 
 from jaxdamp._types import Scalar, ScalarLike
-from jaxdamp._vectors import Matrix, MemoryLayout, Vector, laid_out, minus, times
+from jaxdamp._vectors import Matrix, MemoryLayout, SmallVector, laid_out, minus, times
 from jaxdamp.control import ControlLoop, ControlState
 from jaxdamp.vehicles import Ports, States, System, rest_position
 
@@ -25,8 +25,8 @@ class RoadInput(NamedTuple):
         rate: [m/s], shape (wheels,); None where it is not needed.
     """
 
-    height: Vector
-    rate: Vector | None
+    height: SmallVector
+    rate: SmallVector | None
 
 
 class RoadEdges(NamedTuple):
@@ -53,9 +53,9 @@ class StepState(NamedTuple):
         force: of each element [N], positive when it resists extension.
     """
 
-    motion: Vector
+    motion: SmallVector
     states: States
-    force: Vector
+    force: SmallVector
     memory: PyTree = None
     control: ControlState | None = None
 
@@ -83,7 +83,7 @@ class Equations(eqx.Module):
         self.deflection = laid_out(form.ports, layout)
         self.road_deflection = None if form.port_road is None else laid_out(form.port_road, layout)
 
-    def at_ports(self, motion: Vector, road: RoadInput) -> tuple[Vector, Vector]:
+    def at_ports(self, motion: SmallVector, road: RoadInput) -> tuple[SmallVector, SmallVector]:
         """Deflections of the elements [m] and their rates [m/s], positive in extension, shape (ports,)."""
         n = len(motion) // 2
         deflection, rate = times(self.deflection, motion[:n]), times(self.deflection, motion[n:])
@@ -92,7 +92,7 @@ class Equations(eqx.Module):
             rate = minus(rate, times(self.road_deflection, road.rate))
         return checkpoint_name((deflection, rate), FOR_REVERSE)
 
-    def at(self, motion: Vector, states: States, road: RoadInput, memory: PyTree = None) -> StepState:
+    def at(self, motion: SmallVector, states: States, road: RoadInput, memory: PyTree = None) -> StepState:
         """The vehicle in this motion, with the forces of its elements."""
         return StepState(motion, states, self.ports.force(*self.at_ports(motion, road), states), memory)
 

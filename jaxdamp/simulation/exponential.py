@@ -24,7 +24,7 @@ from jaxdamp._types import Scalar, Signal
 from jaxdamp._vectors import (
     Matrix,
     MemoryLayout,
-    Vector,
+    SmallVector,
     laid_out,
     materialise_derivatives_once,
     materialise_once,
@@ -82,7 +82,7 @@ FEW_STATES = 4  # up to which one car is best written number by number, if loops
 class StepBefore(NamedTuple):
     """Forces [N] of the elements a step before, and the states that are extrapolated, one and two steps before."""
 
-    force: Vector
+    force: SmallVector
     states: Earlier
 
 
@@ -164,19 +164,19 @@ class ExponentialStepper(AbstractStepper):
         (x, v), a = equations.at_ports(now.motion, road), times(self.equations.deflection, acceleration)
         moved = _each(lambda x, v, a: x - dt * (v - 0.5 * dt * a), x, v, a), _each(lambda v, a: v - dt * a, v, a)
 
-        def force(commands: Commands) -> Vector:
+        def force(commands: Commands) -> SmallVector:
             return self.equations.at_commands(commands).ports.force(*moved, now.states)
 
         before, change = jax.jvp(force, (commands,), (rises,))
         return after._replace(memory=now.memory._replace(force=plus(before, change)))
 
-    def _reached(self, motion: Vector, road: RoadInput) -> tuple[Vector, Vector]:
+    def _reached(self, motion: SmallVector, road: RoadInput) -> tuple[SmallVector, SmallVector]:
         deflection, rate = self.equations.at_ports(motion, road)
         one = self.opaque_one
         return materialise_derivatives_once(deflection, one), materialise_derivatives_once(rate, one)
 
 
-def _each(function: Callable[..., Scalar], *vectors: Vector) -> Vector:
+def _each(function: Callable[..., Scalar], *vectors: SmallVector) -> SmallVector:
     """A function of the entries of vectors, one by one."""
     if isinstance(vectors[0], tuple):
         return tuple(function(*entries) for entries in zip(*vectors, strict=True))

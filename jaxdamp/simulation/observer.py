@@ -11,7 +11,7 @@ from jax.ad_checkpoint import checkpoint_name
 from jaxtyping import Array, Float, Int, PyTree
 
 from jaxdamp._types import Scalar, Signal
-from jaxdamp._vectors import MemoryLayout, Vector, scalars
+from jaxdamp._vectors import MemoryLayout, SmallVector, scalars
 from jaxdamp.metrics import Gathered, Metric, discrete_weighting
 from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver, RunState
 from jaxdamp.simulation.equations import FOR_REVERSE, Equations, RoadEdges, RoadInput, StepState, road_rate, settled
@@ -47,7 +47,7 @@ class Recorder(AbstractObserver):
         """Nothing is gathered."""
         return ()
 
-    def saved(self, now: StepState, gathered: tuple[()]) -> tuple[Vector, States, Array | None]:
+    def saved(self, now: StepState, gathered: tuple[()]) -> tuple[SmallVector, States, Array | None]:
         """Motion, states and commands: forces follow from them, and a loop that does not save them has a small body."""
         return now.motion, now.states, None if now.control is None else jnp.stack(_of_control(now))
 
@@ -104,19 +104,19 @@ class Filter(NamedTuple):
     ramp: np.ndarray
     output: np.ndarray
 
-    def __call__(self, state: Vector, before: Scalar, after: Scalar) -> tuple[Scalar, ...]:
+    def __call__(self, state: SmallVector, before: Scalar, after: Scalar) -> tuple[Scalar, ...]:
         """Its state a step later, for an input straight from before to after."""
         rise = after - before
         driven = zip(self.held, self.ramp, strict=True)
         pushes = [float(held) * before + float(ramp) * rise for held, ramp in driven]
         return tuple(_constant_dot(row, state, push) for row, push in zip(self.phi, pushes, strict=True))
 
-    def of(self, state: Vector) -> Scalar:
+    def of(self, state: SmallVector) -> Scalar:
         """Its output."""
         return _constant_dot(self.output, state, jnp.zeros_like(state[0]))
 
 
-def _constant_dot(row: np.ndarray, vector: Vector, start: Scalar) -> Scalar:
+def _constant_dot(row: np.ndarray, vector: SmallVector, start: Scalar) -> Scalar:
     """Sum of products, without those that are zero."""
     for factor, entry in zip(row, vector, strict=True):
         start = start + float(factor) * entry if factor else start
@@ -209,7 +209,7 @@ class MetricObserver(AbstractObserver):
         return checkpoint_name(values if isinstance(values, tuple) else scalars(values), FOR_REVERSE)
 
     def _samples(
-        self, values: Sequence[Scalar], weighting_states: Sequence[Vector], rest: Sequence[Scalar]
+        self, values: Sequence[Scalar], weighting_states: Sequence[SmallVector], rest: Sequence[Scalar]
     ) -> list[Scalar]:
         """The sample of each metric's record."""
         plain = dict(zip(self.names, values, strict=True))

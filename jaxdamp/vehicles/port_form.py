@@ -18,7 +18,7 @@ from jaxtyping import Array, Float, PyTree
 
 from jaxdamp._matrices import solve
 from jaxdamp._types import Scalar, State
-from jaxdamp._vectors import Matrix, MemoryLayout, Vector, plus, rows, times
+from jaxdamp._vectors import Matrix, MemoryLayout, SmallVector, plus, rows, times
 from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
 
 
@@ -230,7 +230,9 @@ class LinearMap(eqx.Module):
     road: Matrix
     road_rate: Matrix
 
-    def __call__(self, motion: Vector, force: Vector, road: Vector, road_rate: Vector | None) -> Vector:
+    def __call__(
+        self, motion: SmallVector, force: SmallVector, road: SmallVector, road_rate: SmallVector | None
+    ) -> SmallVector:
         """Its value. The contribution of the road is summed first, since it is the same for all cars of a batch.
 
         Without a road rate, the rate is zero.
