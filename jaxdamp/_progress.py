@@ -2,8 +2,12 @@
 
 import sys
 import time
+from collections.abc import Callable
 from types import TracebackType
 from typing import Any, final
+
+
+BAR = 20  # characters
 
 
 @final
@@ -57,3 +61,27 @@ def _displayed(line: str, output: Any) -> Any:
         return display(content, raw=True, display_id=True)
     output.update(content, raw=True)
     return output
+
+
+def tell(
+    progress: Callable[[int, int], None] | None,
+    shown: Progress,
+    done: int,
+    total: int,
+    rate: float,
+    what: str = "points",
+) -> None:
+    """Say how far work of many points is, by the function of the caller or in a line with the time left."""
+    if progress is not None:
+        progress(done, total)
+    else:
+        full = BAR * done // total
+        remaining = (total - done) / rate
+        time_left = (
+            f"{remaining:.0f} s"
+            if remaining < 120
+            else f"{remaining / 60:.0f} min"
+            if remaining < 7200
+            else f"{remaining / 3600:.1f} h"
+        )
+        shown(f"{'█' * full}{'·' * (BAR - full)} {100 * done // total} %, {done} of {total} {what}, {time_left} left")

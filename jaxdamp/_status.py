@@ -15,6 +15,7 @@ class Status(enum.Enum):
     ALL_STEPS = "All steps were taken."
     NOT_STEADY = "No motion that repeats with every period of the excitation was found."
     UNSTABLE = "The motion that was found is unstable: after the smallest disturbance it goes over into another one."
+    LEFT_OUT = "It was left out: there is no result."
     COMPUTED = "It was computed directly, without a search."
 
     @property

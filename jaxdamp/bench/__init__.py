@@ -23,6 +23,7 @@ from jaxdamp.bench.contradictions import (
     contradictions_in_words as contradictions_in_words,
     pairs_in_words as pairs_in_words,
 )
+from jaxdamp.bench.damper_records import DamperRecords, read_dampers
 from jaxdamp.bench.evaluation import (
     OEM_VELOCITIES as OEM_VELOCITIES,
     Evaluation as Evaluation,
@@ -66,6 +67,7 @@ __all__ = [
     "BenchRun",
     "BenchSet",
     "CommandStep",
+    "DamperRecords",
     "Limit",
     "MultiSineTest",
     "RandomTest",
@@ -86,6 +88,7 @@ __all__ = [
     "preflight",
     "programmes",
     "read",
+    "read_dampers",
     "read_kinematics",
     "read_limits",
     "read_rides",

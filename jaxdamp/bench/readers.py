@@ -20,7 +20,7 @@ _LARGEST_SHEET, _LARGE, _INFLATION = 2**29, 2**26, 100  # bytes of a part of a w
 _MOST_COLUMNS = 64  # of a matrix in a MATLAB file that is taken for channels side by side
 
 
-def _library(module: str, file: Path) -> ModuleType:
+def library(module: str, file: Path) -> ModuleType:
     """A library that only this format needs."""
     try:
         return importlib.import_module(module)
@@ -33,9 +33,9 @@ def _library(module: str, file: Path) -> ModuleType:
 
 def read_xlsx(file: Path) -> list[RawTable]:
     """Read a workbook: every sheet with rows of numbers is a record."""
-    library = _library("openpyxl", file)
+    openpyxl = library("openpyxl", file)
     _check_inflation(file)
-    book = library.load_workbook(file, read_only=True, data_only=True)
+    book = openpyxl.load_workbook(file, read_only=True, data_only=True)
     try:
         sheets = {sheet.title: list(sheet.iter_rows(values_only=True)) for sheet in book.worksheets}
     finally:
@@ -92,7 +92,7 @@ def _written(cell: Any) -> str:
 
 def read_mat(file: Path) -> list[RawTable]:
     """Read a MATLAB file, v5 to v7.3: vectors side by side, in the file or in a structure, are a record."""
-    content = _library("pymatreader", file).read_mat(file)
+    content = library("pymatreader", file).read_mat(file)
     return _alone(list(_structures(file, "", {k: v for k, v in content.items() if not k.startswith("__")})))
 
 
@@ -149,7 +149,7 @@ def _vectors(name: str, value: Any, unit: str) -> list[RawColumn]:
 
 def read_tdms(file: Path) -> list[RawTable]:
     """Read a TDMS file: every group is a record. Waveforms without a channel for the time bring their own."""
-    content, tables = _library("nptdms", file).TdmsFile.read(file), []
+    content, tables = library("nptdms", file).TdmsFile.read(file), []
     for group in content.groups():
         columns = []
         for channel in group.channels():
@@ -164,7 +164,7 @@ def read_tdms(file: Path) -> list[RawTable]:
 def read_mdf(file: Path) -> list[RawTable]:
     """Read an MDF file: channel groups with the same clock are a record together."""
     tables: list[tuple[str, np.ndarray, list[RawColumn]]] = []
-    with _library("asammdf", file).MDF(file) as content:
+    with library("asammdf", file).MDF(file) as content:
         for index, group in enumerate(content.groups):
             clock = np.asarray(content.get_master(index), dtype=np.float64)
             channels = [content.get(group=index, index=i) for i, c in enumerate(group.channels) if c.channel_type == 0]
@@ -186,8 +186,8 @@ def read_mdf(file: Path) -> list[RawTable]:
 
 def read_parquet(file: Path) -> list[RawTable]:
     """Read a Parquet file; units may stand in the metadata of its fields, as "unit"."""
-    _library("pyarrow", file)
-    table, columns = _library("pyarrow.parquet", file).read_table(file), []
+    library("pyarrow", file)
+    table, columns = library("pyarrow.parquet", file).read_table(file), []
     for field, data in zip(table.schema, table.columns, strict=True):
         unit = (field.metadata or {}).get(b"unit", b"").decode()
         values = data.to_numpy()

@@ -8,6 +8,7 @@ import platform
 import re
 import threading
 import time
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
@@ -17,6 +18,7 @@ import jax
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._progress import Progress, tell
 from jaxdamp.blocks.store import BlockStore
 
 
@@ -50,6 +52,11 @@ class AbstractWork(ABC):
     def without_results(self, indices: np.ndarray, reason: str) -> Results:
         """What stands in the store for points that cannot be computed."""
 
+    def part(self, indices: np.ndarray) -> "AbstractWork":
+        """The work with only what these points need, which is sent with their block; itself if all need the same."""
+        del indices
+        return self
+
 
 class _Job(NamedTuple):
     """Work as it travels."""
@@ -73,7 +80,7 @@ def run_blocks(work: AbstractWork, store: BlockStore, cluster: Cluster, on_block
     left = [int(number) for number in store.left()]
     if cluster is not None and not isinstance(cluster, str):
         if left:
-            _by_workers(work, store, _Workers(cluster, work), left, on_block)
+            _by_workers(work, store, _Workers(cluster, work, store.blocks.indices(left[0])), left, on_block)
         return
     for number in left if cluster is None else _part(cluster, left):
         indices = store.blocks.indices(number)
@@ -81,12 +88,50 @@ def run_blocks(work: AbstractWork, store: BlockStore, cluster: Cluster, on_block
         on_block(indices.size)
 
 
+def fill(
+    store: BlockStore,
+    work: AbstractWork,
+    cluster: Cluster,
+    progress: Callable[[int, int], None] | None,
+    doing: str,
+    what: str = "points",
+) -> None:
+    """Compute the blocks that a store lacks or that were damaged on the disk, and tell how far it is.
+
+    Arguments:
+        store: takes the blocks.
+        work: computes the points.
+        cluster: as in `run_blocks`.
+        progress: called with the number of points done and of all points; a line in the terminal if None.
+        doing: in a word, such as "Sweeping".
+        what: the points are.
+    """
+    damaged = store.repair()
+    if damaged:
+        warnings.warn(
+            f"{damaged} blocks in {store.path} were damaged on the disk, and are computed anew.", stacklevel=5
+        )
+    total = int(np.prod(store.blocks.shape))
+    left = sum(store.blocks.size(int(number)) for number in store.left())
+    done, start = total - left, time.monotonic()
+    with Progress(doing) as shown:
+
+        def on_block(points: int) -> None:
+            nonlocal done
+            done += points
+            rate = (done - total + left) / max(time.monotonic() - start, 1e-9)
+            tell(progress, shown, done, total, rate, what)
+
+        run_blocks(work, store, cluster, on_block)
+
+
 @final
 class _Workers:
     """The processes of a cluster, which have the work."""
 
-    def __init__(self, cluster: "Executor | HasExecutor", work: AbstractWork) -> None:
-        self._cluster, job = cluster, _packed(work)
+    def __init__(self, cluster: "Executor | HasExecutor", work: AbstractWork, first: np.ndarray) -> None:
+        self._cluster, self._work = cluster, work
+        self._job = _packed(work) if work.part(first) is work else None
         executor = cluster.get_executor(pure=False) if isinstance(cluster, HasExecutor) else cluster
         if not isinstance(executor, Executor):
             must = "be a Dask client, an executor of `concurrent.futures`, or a part such as '1/4'"
@@ -94,16 +139,20 @@ class _Workers:
         if not self.count():
             remedy = "Start some: `Client(n_workers=4, threads_per_worker=1)`."
             _checks.refuse("cluster", "have workers", "one without", remedy)
-        self._executor, self.job = executor, job  # which goes with every block: no copy is lost with its worker
+        self._executor = executor
 
     def count(self) -> int:
         """How many blocks can be computed at a time."""
         threads = getattr(self._cluster, "nthreads", None)
         return os.cpu_count() or 1 if threads is None else sum(threads().values())
 
+    def job(self, indices: np.ndarray) -> _Job:
+        """The work as it travels, with every block: no copy is lost with its worker."""
+        return self._job or _packed(self._work.part(indices))
+
     def block(self, store: BlockStore, number: int) -> "Future[int]":
         """Compute and write a block; gives the number of its points."""
-        return self._executor.submit(_block, self.job, store, number)
+        return self._executor.submit(_block, self.job(store.blocks.indices(number)), store, number)
 
 
 def _by_workers(
@@ -127,7 +176,7 @@ def _by_workers(
         del future  # Dask computes again what is asked for and was lost with a worker
     for number in fatal:
         indices = store.blocks.indices(number)
-        pieces = list(_survivors(workers.job, work, indices))
+        pieces = list(_survivors(workers.job(indices), work, indices))
         store.write(number, {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]})
         on_block(indices.size)
 

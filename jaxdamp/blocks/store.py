@@ -137,13 +137,22 @@ class BlockStore:
         dims: tuple[str, ...],
         variables: Mapping[str, Variable],
         coordinates: Mapping[str, tuple[str, np.ndarray, dict[str, str]]],
+        known: Mapping[str, np.ndarray] | None = None,
     ) -> None:
-        """Make the store, whole or not at all, unless it is there; one of something else is refused."""
+        """Make the store, whole or not at all, unless it is there; one of something else is refused.
+
+        Arguments:
+            dims: names of the axes of the grid.
+            variables: what is stored for each point.
+            coordinates: along an axis each, with attributes.
+            known: what is known of the points already, by the name of its variable.
+        """
         self._names = tuple(variables)
         if not self.path.exists():
             draft = Path(tempfile.mkdtemp(prefix=f".{self.path.name}.", dir=self.path.parent))
             try:
                 self._make(draft, dims, variables, coordinates)
+                _enter(draft, known or {}, 0)
                 draft.chmod(0o777 & ~_umask())
                 draft.rename(self.path)
             except OSError as error:
@@ -191,6 +200,30 @@ class BlockStore:
             compressors=exact,
             dimension_names=(BLOCK,),
         )
+
+    def append(self, known: Mapping[str, np.ndarray]) -> "BlockStore":
+        """The store with further blocks at the end of its only axis, which are not done.
+
+        Arguments:
+            known: what is known of their points, by the name of its variable; whole blocks.
+        """
+        (size,), (box,) = self.blocks.shape, self.blocks.box
+        longer = size + len(next(iter(known.values())))
+        group = _zarr().open_group(self.path, mode="r+")
+        for name in self._names:
+            array: zarr.Array = group[name]  # pyright: ignore[reportAssignmentType]
+            array.resize((longer, *array.shape[1:]))
+        _enter(self.path, known, size)
+        marks: zarr.Array = group[DONE]  # pyright: ignore[reportAssignmentType]
+        marks.resize((longer // box,))  # last: before it the further points are not there
+        more = BlockStore(self.path, Blocks((longer,), (box,)), self._identity)
+        more._names = self._names
+        return more
+
+    def read(self, *names: str) -> dict[str, np.ndarray]:
+        """Whole variables."""
+        group = _zarr().open_group(self.path, mode="r")
+        return {name: np.asarray(group[name][: self.blocks.shape[0]]) for name in names}
 
     def _check(self) -> None:
         """Refuse a store of something else, with what differs."""
@@ -271,6 +304,22 @@ class BlockStore:
         done = sum(self.blocks.size(int(i)) for i in np.flatnonzero(marks >= 0))
         about = {"failed_points": int(marks[marks >= 0].sum()), "points_done": done}
         return data.drop_vars(DONE).set_coords(coordinates).drop_attrs(deep=False).assign_attrs(about)
+
+
+def stored_blocks(path: Path) -> int:
+    """How many blocks a store has; none if there is none, or what is there cannot be read as one."""
+    try:
+        return int(_zarr().open_group(path, mode="r")[DONE].shape[0])
+    except (OSError, KeyError, ValueError):
+        return 0
+
+
+def _enter(path: Path, known: Mapping[str, np.ndarray], start: int) -> None:
+    """Write what is known of points from `start` on, empty texts too: a chunk that is not there was lost."""
+    with _zarr().config.set({"array.write_empty_chunks": True}):
+        group = _zarr().open_group(path, mode="r+")
+        for name, values in known.items():
+            group[name][start : start + len(values)] = values
 
 
 def _zarr() -> ModuleType:

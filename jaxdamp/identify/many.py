@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -14,27 +15,28 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
 from jaxdamp._traced import of_known_numbers
-from jaxdamp.bench import BenchRun, as_runs, usable
+from jaxdamp.bench import BenchRun
+from jaxdamp.blocks import Cluster
 from jaxdamp.dampers import AbstractDamper, Reach
-from jaxdamp.identify.contradicting import contradicting, refuse_contradicting
 from jaxdamp.identify.criteria import FIRST_NOISE, LOSSES, Priors, priors_on
 from jaxdamp.identify.dependence import OWN, Dependence, dependence
 from jaxdamp.identify.initial_states import INITIAL_STATES
-from jaxdamp.identify.lanes import Fitted, LanePriors, Lanes, Products, by_rounds, grouped_records, noise_level
+from jaxdamp.identify.lanes import LanePriors, Lanes, Products, by_rounds, grouped_records
 from jaxdamp.identify.law_result import FitResult
-from jaxdamp.identify.machine import Machine, absent_paths, started_on
+from jaxdamp.identify.machine import Machine
+from jaxdamp.identify.many_blocks import fit_into_store
+from jaxdamp.identify.many_judging import judged, physical
+from jaxdamp.identify.many_records import begun_on, by_name, fitted_records, refuse_several_laws
 from jaxdamp.identify.many_result import ManyFits
-from jaxdamp.identify.model import initial_state_for, on_rig, rig_of
+from jaxdamp.identify.model import initial_state_for, rig_of
 from jaxdamp.identify.preparing import weights
 from jaxdamp.identify.several import other_starts
 from jaxdamp.identify.starting import Start
-from jaxdamp.parameters import Coordinates, FreeParameters, free_parameters
+from jaxdamp.parameters import Coordinates, FreeParameters
 from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, SearchLanes, least_squares_on_host
 
 
 STARTED_FROM = 12  # dampers whose records give the start of a law class
-BLIND = 1e-12  # eigenvalue of JᵀJ, relative to the largest, below which a direction changes no force
-CALL = 'fit_many(law, {"A": runs_of_a, "B": runs_of_b})'
 
 
 @of_known_numbers
@@ -57,6 +59,9 @@ def fit_many(
     starts: int = 1,
     max_steps: int = 200,
     bad_records: str = "refuse",
+    file: str | os.PathLike[str] | None = None,
+    cluster: Cluster = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> ManyFits:
     """Fit one law to many dampers at once: the same least squares as `fit`, for all of them side by side.
 
@@ -89,6 +94,12 @@ def fit_many(
             parameters then begin where the fits of single dampers end.
         max_steps: largest number of steps of each search.
         bad_records: "refuse", "leave_out" or "keep" records with an error, as in `fit`; a damper keeps one at least.
+        file: a Zarr store (`.zarr`, a folder) for the fits, which are computed in blocks of 64 dampers. The records of
+            `bench.DamperRecords` are read block by block; a damper that cannot be read or fitted does not stop the
+            others, and its remark says why. The same call goes on after an interruption, and fits only dampers that
+            are new or whose records changed. A law class starts from the first damper, so that a store can grow.
+        cluster: who computes the blocks, as in `jaxdamp.sweep`: a Dask `Client`, an executor, or a part such as "3/16".
+        progress: of the blocks, called with the number of rows done and of all rows, 64 in a block.
 
     Returns:
         The laws with their parameters, standard errors, scores and a status each; dampers that differ from the others
@@ -107,25 +118,26 @@ def fit_many(
     >>> round(float(many.law_at(1.5).rebound_rate), -1)
     2150.0
     """
-    names, records = _named(dampers, bad_records, robust=loss != "squares")
     _checks.one_of("weighting", weighting, ["samples", "runs"])
     _checks.one_of("loss", loss, LOSSES)
     _checks.one_of("initial_state", initial_state, INITIAL_STATES)
     _checks.counts(max_steps=max_steps, starts=starts)
     stated = None if settings is None else tuple(map(float, settings))
-    some = [run for runs in records[:: -(-len(records) // STARTED_FROM)] for run in runs]
-    begun, machine, held = started_on(law, some, rig, [*(bounds or ()), *(priors or ()), *(tie or ()), *shared])
-    model = on_rig(begun, machine)
-    if bad_records != "keep" and initial_state != "estimated":
-        for name, runs in zip(names, records, strict=True):
-            refuse_contradicting(contradicting(model, runs), f"dampers[{name!r}]")
-    free = free_parameters(model, freeze=[*freeze, *absent_paths(machine), *held], bounds=bounds, tie=tie)
-    _checks.finite("law", free.values)
-    depends = dependence(free, shared, stated, len(names))
     how = {"rig": rig, "freeze": freeze, "bounds": bounds, "tie": tie, "weighting": weighting, "loss": loss}
     how |= {"priors": priors, "initial_state": initial_state, "samples_per_cycle": samples_per_cycle}
-    how |= {"max_steps": max_steps, "bad_records": "keep"}
-    many = functools.partial(ManyFits, tuple(names), tuple(records), stated, free=free, options=how)
+    how |= {"max_steps": max_steps, "bad_records": bad_records}
+    by_names = by_name(dampers)
+    if file is not None or cluster is not None:
+        how |= {"starts": starts}
+        return fit_into_store(law, by_names, stated, file, cluster, progress, shared=bool(shared), options=how)
+    names, records = tuple(by_names), [fitted_records(name, runs, how) for name, runs in by_names.items()]
+    some = [run for runs in records[:: -(-len(records) // STARTED_FROM)] for run in runs]
+    begun, _, model, _, free = begun_on(law, some, how, shared)
+    for name, runs in zip(names, records, strict=True):
+        refuse_several_laws(name, runs, model, how)
+    depends = dependence(free, shared, stated, len(names))
+    how |= {"bad_records": "keep"}
+    many = functools.partial(ManyFits, names, tuple(records), stated, free=free, options=how)
     initial_state = initial_state_for(model, initial_state)
     if initial_state == "estimated":
         if depends is not None:
@@ -160,8 +172,8 @@ def _side_by_side(
     fitted = by_rounds(lanes, end.of(best), loss, lambda some, y: _solved(some, y, depends, max_steps)[0], depends)
     if depends is not None and (loss != "squares" or lanes.priors is not None):
         vector = depends.start(fitted.end.y)
-    return _judged(fitted, depends, [len(runs) for runs in records]) | {
-        "values": np.asarray(_both(lanes.coordinates, jnp.asarray(fitted.end.y))[0], np.float64),
+    return judged(fitted, depends, [len(runs) for runs in records]) | {
+        "values": np.asarray(physical(lanes.coordinates, jnp.asarray(fitted.end.y))[0], np.float64),
         "status": tuple(fitted.end.status),
         "steps": fitted.end.steps,
         "vector": vector,
@@ -202,26 +214,6 @@ def _once(priors: Priors, free: FreeParameters, depends: Dependence | None) -> P
     return dataclasses.replace(priors, deviation=priors.deviation * jnp.asarray(np.sqrt(count)))
 
 
-def _named(dampers: object, bad_records: str, *, robust: bool) -> tuple[list[str], list[tuple[BenchRun, ...]]]:
-    """The names of the dampers and the records of each."""
-    if isinstance(dampers, Mapping):
-        pairs = [(str(name), runs) for name, runs in dampers.items()]
-    elif isinstance(dampers, Iterable) and not isinstance(dampers, str | BenchRun):
-        pairs = [(str(i), runs) for i, runs in enumerate(dampers)]
-    else:
-        _checks.refuse("dampers", "be the records of each damper", _checks.described(dampers), f"The call is `{CALL}`.")
-    if not pairs:
-        _checks.refuse("dampers", "hold at least one damper", "empty")
-    records = [as_runs(runs, f"dampers[{name!r}]") for name, runs in pairs]
-    for (name, _), runs in zip(pairs, records, strict=True):
-        if not any(np.ptp(run.force) > 0 for run in runs):
-            _checks.refuse(f"dampers[{name!r}]", "hold records with a force that varies", f"{len(runs)} without")
-    named = zip(pairs, records, strict=True)
-    return [name for name, _ in pairs], [
-        usable(runs, bad_records, robust=robust, argument=f"dampers[{name!r}]") for (name, _), runs in named
-    ]
-
-
 def _with_other_starts(
     lanes: Lanes, records: Sequence[Sequence[BenchRun]], starts: int
 ) -> tuple[Lanes, Float[np.ndarray, "lanes free"]]:
@@ -239,12 +231,6 @@ def _with_other_starts(
 @eqx.filter_jit
 def _from_physical(coordinates: Coordinates, values: Float[Array, "lanes free"]) -> Float[Array, "lanes free"]:
     return jax.vmap(coordinates.from_physical)(values)
-
-
-@eqx.filter_jit
-def _both(coordinates: Coordinates, y: Float[Array, "lanes free"]) -> tuple[Array, Array]:
-    """Physical values and their derivatives by the coordinates."""
-    return jax.vmap(coordinates.to_physical)(y), jax.vmap(jax.jacfwd(coordinates.to_physical))(y)
 
 
 def _solved(
@@ -273,53 +259,3 @@ def _solved(
     products = np.broadcast_to(end.aux, (count, *end.aux.shape[1:]))
     together = SearchLanes(y, products, end.status * count, end.steps.repeat(count))
     return together, everyone, end.y[0]
-
-
-def _judged(fitted: Fitted, depends: Dependence | None, counts: Sequence[int]) -> dict[str, Any]:
-    """Errors of each damper and of each of its records, drift, and standard errors of its numbers."""
-    lanes, (count, free) = fitted.lanes, fitted.end.y.shape
-    percent, rmse, drift, noise = (np.zeros(count) for _ in range(4))
-    first, by_record = np.cumsum([0, *counts]), tuple(np.zeros(n) for n in counts)
-    free_numbers, levels = free if depends is None else depends.size / count, lanes.levels()
-    for i, records in enumerate(lanes.missed(fitted.end.y)):
-        errors = [record.residual / record.weight for record in records]
-        drift[i] = max(record.drift for record in records)
-        together, measured = np.concatenate(errors), np.concatenate([record.force for record in records])
-        rmse[i] = np.sqrt(np.mean(together**2))
-        spread = np.linalg.norm(measured - measured.mean())
-        percent[i] = 100.0 * (1.0 - np.linalg.norm(together) / spread) if spread > 0 else -np.inf
-        for record, error in zip(records, errors, strict=True):
-            by_record[i][record.number - first[i]] = np.sqrt(np.mean(error**2))
-        noise[i] = (fitted.factor[i] * noise_level([r.residual for r in records], free_numbers) / levels[i]) ** 2
-    errors_of_numbers = _standard_errors(fitted, depends, noise)
-    named = {"standard_errors": errors_of_numbers, "fit_percent": percent, "rmse": rmse, "record_rmse": by_record}
-    return named | {"drift": drift}
-
-
-def _standard_errors(
-    fitted: Fitted, depends: Dependence | None, noise: Float[np.ndarray, " dampers"]
-) -> Float[np.ndarray, "dampers free"]:
-    """Standard errors of the numbers of each damper, from the variance of the noise relative to its level."""
-    y, products = fitted.end.y, fitted.end.aux
-    slopes = np.asarray(_both(fitted.lanes.coordinates, jnp.asarray(y))[1], np.float64)
-    inverse = [_inverse(of_damper[:-1, :-1]) for of_damper in (products if depends is None else products[:1])]
-    errors, free = np.zeros(y.shape), y.shape[1]
-    for i in range(len(y)):
-        columns, rows = (np.arange(free), np.eye(free)) if depends is None else depends.rows(i)
-        variances, lost = inverse[i if depends is None else 0]
-        variance = noise[i] if depends is None else float(np.mean(noise))
-        to_values = slopes[i] @ rows
-        covariance = variance * to_values @ variances[np.ix_(columns, columns)] @ to_values.T
-        undetermined = np.any(lost[columns] & (to_values != 0), axis=1)
-        errors[i] = np.where(undetermined, np.inf, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
-    return errors
-
-
-def _inverse(products: Float[np.ndarray, "free free"]) -> tuple[np.ndarray, np.ndarray]:
-    """(JᵀJ)⁻¹ without the directions that change no force, and the numbers that take part in those."""
-    norms = np.sqrt(np.diag(products))
-    scale = np.where(norms > 0, norms, 1.0)
-    squares, directions = np.linalg.eigh(products / np.outer(scale, scale))
-    seen = squares > BLIND * squares[-1]
-    inverse = (directions[:, seen] / squares[seen]) @ directions[:, seen].T
-    return inverse / np.outer(scale, scale), np.sum(directions[:, seen] ** 2, axis=1) < 1.0 - 1e-3

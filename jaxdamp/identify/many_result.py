@@ -2,7 +2,7 @@
 
 import dataclasses
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
@@ -19,7 +19,7 @@ from jaxdamp.identify.dependence import OWN, Dependence
 from jaxdamp.identify.estimates import rounded
 from jaxdamp.identify.estimating import WEAK
 from jaxdamp.identify.initial_states import DRIFT
-from jaxdamp.identify.model import Model, covered_range, law_of, rig_of, with_range
+from jaxdamp.identify.model import Model, covered_range, joined_range, law_of, rig_of, with_range
 from jaxdamp.parameters import Coordinates, FreeParameters
 from jaxdamp.rig import Rig
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 OUTLYING = 6.0  # robust standard deviations from the other dampers from which one is named
 LEAST_SPREAD = 0.02  # of the median: numbers that differ by less do not make a damper stand out
-LEFT_OUT = 0.02  # share of samples with little weight, above that of the others, from which it is named
+NOT_COUNTED = 0.02  # share of samples with little weight, above that of the others, from which it is named
 ONE_RECORD = 1.5  # times the RMSE of the other records, from which one is named as the cause
 CERTAIN = 4.0  # standard errors by which it must differ as well
 
@@ -41,7 +41,7 @@ class ManyFits(AbstractResult):
 
     Attributes:
         names: of the dampers.
-        records: the records of each damper.
+        records: the records of each damper; from a store they are read when they are asked for.
         settings: the setting of each damper, if stated.
         values: of the free numbers of each damper, in their units, shape (dampers, free).
         standard_errors: of the values; infinite for numbers that the records do not determine.
@@ -57,10 +57,11 @@ class ManyFits(AbstractResult):
         drift: largest relative change of the states of each damper over the cycle before a record that starts in the
             periodic solution.
         options: of the call, for `fit` of one damper.
+        reasons: of fits in a store, why a damper was left out; empty for the others.
     """
 
     names: tuple[str, ...]
-    records: tuple[tuple[BenchRun, ...], ...]
+    records: Sequence[tuple[BenchRun, ...]]
     settings: tuple[float, ...] | None
     values: Float[np.ndarray, "dampers free"]
     standard_errors: Float[np.ndarray, "dampers free"]
@@ -75,6 +76,7 @@ class ManyFits(AbstractResult):
     share_left_out: Float[np.ndarray, " _"] = dataclasses.field(default_factory=lambda: np.zeros(0))
     drift: Float[np.ndarray, " _"] = dataclasses.field(default_factory=lambda: np.zeros(0))
     options: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    reasons: tuple[str, ...] = ()
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -84,8 +86,14 @@ class ManyFits(AbstractResult):
     @functools.cached_property
     def models(self) -> tuple[Model, ...]:
         """The fitted law of each damper, on its machine if one was fitted."""
-        rows = zip(self.values, self.records, strict=True)
-        return tuple(with_range(self.free.started_at(row).tree, covered_range(runs)) for row, runs in rows)
+        return tuple(map(self._model, range(len(self))))
+
+    def _model(self, place: int) -> Model:
+        """The fitted law of one damper, on its machine if one was fitted."""
+        if self.status[place] is Status.LEFT_OUT:
+            must, value = "name a damper that was fitted", f"{self.names[place]!r} ({self.reasons[place]})"
+            _checks.refuse("name", must, value, "Take the laws of the others by name: `many[name]`.")
+        return with_range(self.free.started_at(self.values[place]).tree, covered_range(self.records[place]))
 
     @property
     def laws(self) -> tuple[AbstractDamper, ...]:
@@ -104,7 +112,7 @@ class ManyFits(AbstractResult):
     def __getitem__(self, name: str) -> AbstractDamper:
         """The fitted law of the damper of that name."""
         _checks.one_of("name", name, self.names)
-        return self.laws[self.names.index(name)]
+        return law_of(self._model(self.names.index(name)))
 
     def fit(self, name: str, **options: Any) -> "FitResult":
         """The fit of one damper with everything that `identify.fit` gives: several minima, profiles, bias, states.
@@ -139,7 +147,7 @@ class ManyFits(AbstractResult):
             _checks.one_of("blend", blend, ("parameters", "force"))
         if self.settings is None:
             _checks.refuse("settings", "be given to `fit_many` for a law between them", None)
-        settings = np.array(self.settings)
+        settings = np.array(self.settings)[self._fitted]
         if not settings.min() <= setting <= settings.max():
             must = f"be from {settings.min():g} to {settings.max():g}, where there are dampers"
             _checks.refuse("setting", must, setting)
@@ -148,21 +156,21 @@ class ManyFits(AbstractResult):
             law = self._interpolated(setting)
         else:
             law = Scheduled((self._interpolated(low), self._interpolated(high)), [low, high], setting, "force")
-        return with_fitted_range(law, covered_range([run for runs in self.records for run in runs]))
+        return with_fitted_range(law, joined_range([covered_range(self.records[place]) for place in self._fitted]))
 
     def _blend_at(self, low: float, high: float) -> str:
         """What lies between two settings: forces if a number that is not shared is undetermined at one of them."""
         not_shared = np.ones(len(self.free.names), bool) if self.dependence is None else self.dependence.degree == OWN
         not_shared &= np.array([not name.startswith("rig.") for name in self.free.names])
-        at = np.isin(np.array(self.settings), (low, high))
+        at = np.isin(np.array(self.settings), (low, high)) & np.isin(np.arange(len(self)), self._fitted)
         weak = ~(self.standard_errors[at] <= WEAK * np.abs(self.values[at]))
         return "force" if np.any(weak[:, not_shared]) else "parameters"
 
     def _interpolated(self, setting: float) -> AbstractDamper:
         """The law with parameters on their polynomials, or on straight lines between the settings."""
-        settings = np.array(self.settings)
+        settings, fitted = np.array(self.settings)[self._fitted], self.values[self._fitted]
         distinct = np.unique(settings)
-        means = np.stack([self.values[settings == one].mean(axis=0) for one in distinct])
+        means = np.stack([fitted[settings == one].mean(axis=0) for one in distinct])
         values = np.array([np.interp(setting, distinct, column) for column in means.T])
         if self.dependence is not None and self.vector is not None:
             y = self.dependence.at_setting(self.vector, setting)
@@ -174,26 +182,36 @@ class ManyFits(AbstractResult):
     @functools.cached_property
     def remarks(self) -> tuple[str, ...]:
         """For each damper how its search failed and in what it differs from the others; empty for most."""
-        texts: list[list[str]] = [[] if s is Status.CONVERGED else [s.sentence] for s in self.status]
+        good = (Status.CONVERGED, Status.LEFT_OUT)
+        texts: list[list[str]] = [[] if s in good else [s.sentence] for s in self.status]
+        for i, reason in enumerate(self.reasons):
+            texts[i] += [f"it was left out: {reason}"] if reason else []
+        fitted = self._fitted
+        settings = None if self.settings is None else tuple(np.array(self.settings)[fitted])
         for i in np.flatnonzero(self.drift > DRIFT):
             texts[i].append(f"its states are not periodic: over a cycle they still change by {self.drift[i]:.2g}")
         misfit = 100.0 - self.fit_percent
-        for i, score in enumerate(_robust_scores(misfit, None)):
+        for i, score in zip(fitted, _robust_scores(misfit[fitted], None), strict=True):
             if score > OUTLYING:
-                times = misfit[i] / np.median(misfit)
+                times = misfit[i] / np.median(misfit[fitted])
                 texts[i].append(f"its error is {times:.2g} times that of the others{self._mostly_of(i)}")
         for i, share in enumerate(self.share_left_out):
-            if share > LEFT_OUT + float(np.median(self.share_left_out)):
+            if share > NOT_COUNTED + float(np.nanmedian(self.share_left_out)):
                 texts[i].append(f"{100.0 * share:.2g} % of its samples have less than half weight")
         for j, name in enumerate(self.parameters):
-            values = self.values[:, j]
-            expected, scores = _trend(values, self.settings), _robust_scores(values, self.settings)
+            values = self.values[fitted, j]
+            expected, scores = _trend(values, settings), _robust_scores(values, settings)
             apart = np.abs(values - expected)
-            sure = (np.abs(scores) > OUTLYING) & (apart > CERTAIN * self.standard_errors[:, j])
-            for i in np.flatnonzero(sure):
+            sure = (np.abs(scores) > OUTLYING) & (apart > CERTAIN * self.standard_errors[fitted, j])
+            for k in np.flatnonzero(sure):
                 unit = f" {self.free.owners[j].unit}".rstrip()
-                texts[i].append(f"{name} = {values[i]:.4g}{unit} where the others suggest {expected[i]:.4g}")
+                texts[fitted[k]].append(f"{name} = {values[k]:.4g}{unit} where the others suggest {expected[k]:.4g}")
         return tuple("; ".join(text) for text in texts)
+
+    @functools.cached_property
+    def _fitted(self) -> np.ndarray:
+        """The places of the dampers that were fitted."""
+        return np.flatnonzero([status is not Status.LEFT_OUT for status in self.status])
 
     @property
     def unusual(self) -> tuple[str, ...]:
@@ -209,6 +227,9 @@ class ManyFits(AbstractResult):
         rows = []
         for i, name in enumerate(self.names):
             row: list[Any] = [name, *([self.settings[i]] if self.settings is not None else [])]
+            if self.status[i] is Status.LEFT_OUT:
+                rows.append((*row, *[None] * (2 * len(self.parameters) + 2), self.remarks[i]))
+                continue
             for value, error in zip(self.values[i], self.standard_errors[i], strict=True):
                 texts = rounded(float(value), float(error))
                 row += [Shown(float(value), texts[0]), Shown(float(error), texts[1])]
@@ -241,8 +262,10 @@ class ManyFits(AbstractResult):
     @property
     def summary(self) -> str:
         """Law, number of dampers and errors."""
-        head = f"{type(law_of(self.free.tree)).__name__} fitted to {len(self)} dampers: mean fit"
-        return f"{head} {np.mean(self.fit_percent):.1f} %, RMSE up to {np.max(self.rmse):.4g} N"
+        at, law = self._fitted, type(law_of(self.free.tree)).__name__
+        left = f", {len(self) - at.size} of them left out" if at.size < len(self) else ""
+        errors = f": mean fit {np.mean(self.fit_percent[at]):.1f} %, RMSE up to {np.max(self.rmse[at]):.4g} N"
+        return f"{law} fitted to {len(self)} dampers{left}{errors}"
 
     @property
     def warnings(self) -> tuple[str, ...]:

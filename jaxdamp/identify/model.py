@@ -208,6 +208,19 @@ def initial_state(model: Model, effects: tuple[str, ...], cycle: Cycle, followed
     return jnp.where(cycle.periodic, state, law.initial_state()), jnp.where(cycle.periodic, change, 0.0)
 
 
+def joined_range(ranges: Sequence[FittedRange]) -> FittedRange:
+    """The lowest and highest of several ranges.
+
+    Arguments:
+        ranges: of the records of several dampers.
+    """
+    names = {q.name for each in ranges for q in each.known()}
+    limits = {name: [q.limits for each in ranges for q in each.known() if q.name == name] for name in names}
+    return FittedRange(
+        **{name: (min(low for low, _ in both), max(high for _, high in both)) for name, both in limits.items()}
+    )
+
+
 def covered_range(runs: Sequence[BenchRun]) -> FittedRange:
     """Lowest and highest value of each channel over all records, and of temperature and command if stated.
 

@@ -2,7 +2,6 @@
 
 import functools
 import hashlib
-import time
 import warnings
 from collections.abc import Callable, Mapping
 from typing import final
@@ -11,14 +10,13 @@ import jax
 import numpy as np
 
 from jaxdamp import _checks
-from jaxdamp._progress import Progress
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Dataset
-from jaxdamp.blocks import AbstractWork, Blocks, BlockStore, Cluster, Variable, block_size, run_blocks
+from jaxdamp.blocks import AbstractWork, Blocks, BlockStore, Cluster, Variable, block_size, fill
 from jaxdamp.sweeps.axes import PARAMETER, AbstractPoints, Grid, Points, as_points
 from jaxdamp.sweeps.function import Gradients, PointFunction
 from jaxdamp.sweeps.program import quiet
-from jaxdamp.sweeps.running import Computation, Runner, tell
+from jaxdamp.sweeps.running import Computation, Runner
 from jaxdamp.sweeps.table import Table
 
 
@@ -154,23 +152,8 @@ def sweep_into_store(
 ) -> Dataset:
     """Compute the blocks that a store lacks, and give all results, read when they are asked for."""
     program = BlockProgram(computation)
-    store, total = program.store(path), computation.points.count
-    damaged = store.repair()
-    if damaged:
-        warnings.warn(
-            f"{damaged} blocks in {store.path} were damaged on the disk, and are computed anew.", stacklevel=4
-        )
-    left = sum(store.blocks.size(int(number)) for number in store.left())
-    done, start = total - left, time.monotonic()
-    with Progress("Sweeping") as shown:
-
-        def on_block(points: int) -> None:
-            nonlocal done
-            done += points
-            rate = (done - total + left) / max(time.monotonic() - start, 1e-9)
-            tell(progress, shown, done, total, rate)
-
-        run_blocks(program, store, cluster, on_block)
+    store = program.store(path)
+    fill(store, program, cluster, progress, "Sweeping")
     data = program.dataset(store)
     failed = data.attrs["failed_points"]
     if failed:

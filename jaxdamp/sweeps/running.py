@@ -10,7 +10,6 @@ from typing import final
 
 import numpy as np
 
-from jaxdamp._progress import Progress
 from jaxdamp.sweeps.axes import AbstractPoints, Points
 from jaxdamp.sweeps.function import (
     Gradients,
@@ -142,7 +141,6 @@ def _last_line(error: str) -> str:
     return re.sub(r"^\S*Equinox\S*: ", "", line)
 
 
-BAR = 20  # characters
 COMPILED, PRINTED = "compiled by XLA", "printed as C"
 
 
@@ -228,20 +226,3 @@ class Computation:
 
 def _lanes(function: object) -> int | None:
     return function.lanes if isinstance(function, HasLanes) else None
-
-
-def tell(progress: Callable[[int, int], None] | None, shown: Progress, done: int, total: int, rate: float) -> None:
-    """Say how far a sweep is."""
-    if progress is not None:
-        progress(done, total)
-    else:
-        full = BAR * done // total
-        remaining = (total - done) / rate
-        time_left = (
-            f"{remaining:.0f} s"
-            if remaining < 120
-            else f"{remaining / 60:.0f} min"
-            if remaining < 7200
-            else f"{remaining / 3600:.1f} h"
-        )
-        shown(f"{'█' * full}{'·' * (BAR - full)} {100 * done // total} %, {done} of {total} points, {time_left} left")

@@ -13,7 +13,7 @@ import jax
 import numpy as np
 
 from jaxdamp import _checks
-from jaxdamp._progress import Progress
+from jaxdamp._progress import Progress, tell
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import DataArray, Dataset
 from jaxdamp._writing import whole
@@ -22,7 +22,7 @@ from jaxdamp.sweeps.axes import AbstractPoints, as_points
 from jaxdamp.sweeps.block_program import sweep_into_store
 from jaxdamp.sweeps.function import Gradients, PointFunction
 from jaxdamp.sweeps.program import quiet
-from jaxdamp.sweeps.running import COMPILED, Computation, tell
+from jaxdamp.sweeps.running import COMPILED, Computation
 from jaxdamp.sweeps.table import Table, extent
 
 

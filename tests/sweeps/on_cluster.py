@@ -1,7 +1,7 @@
 """Sweeps on a Dask cluster of this machine, in a process of its own: `python on_cluster.py folder kill`.
 
-`kill` is "worker", "client" or "nobody": who ends without warning after some blocks; or "point": one of the points ends
-whoever computes it.
+`kill` is "worker", "client" or "nobody": who ends without warning after some blocks; "point": one of the points ends
+whoever computes it; or "fits": a worker ends while dampers are fitted.
 """
 
 import os
@@ -15,6 +15,9 @@ from dask import config
 from distributed import Client, LocalCluster
 
 import jaxdamp
+from jaxdamp import identify
+from jaxdamp.bench import DamperRecords, SineTest, VirtualDyno
+from jaxdamp.dampers import Bilinear
 from jaxdamp.sweeps import points, random
 
 
@@ -40,6 +43,19 @@ def ending(point):
     return {"y": 2.0 * a}
 
 
+def made(i):
+    """Records of a damper of a line."""
+    law = Bilinear(2000.0 + i % 100, 1200.0)
+    return VirtualDyno(law, force_noise=4.0, sampling_rate=100.0, seed=i).run(SineTest(0.02, 1.0))
+
+
+DAMPERS = DamperRecords(made, range(512))
+
+
+def start():
+    return Bilinear(1500.0, 1500.0)
+
+
 def main(folder: Path, kill: str) -> None:
     from cases import decay
 
@@ -54,11 +70,14 @@ def main(folder: Path, kill: str) -> None:
         workers = list(pids.values())
 
         def told(done: int, _: int) -> None:
-            if done == 4 * BLOCK and kill != "nobody":
-                os.kill(workers[0] if kill == "worker" else os.getpid(), signal.SIGKILL)
+            if done == (128 if kill == "fits" else 4 * BLOCK) and kill != "nobody":
+                os.kill(workers[0] if kill in ("worker", "fits") else os.getpid(), signal.SIGKILL)
 
         if kill == "point":
             jaxdamp.sweep(ending, points(at, 2 * FATAL), file=folder / "point.zarr", cluster=client)
+            return
+        if kill == "fits":
+            identify.fit_many(start(), DAMPERS, file=folder / "fits.zarr", cluster=client, progress=told)
             return
         data = jaxdamp.sweep(decay(), POINTS, file=folder / f"{kill}.zarr", cluster=client, progress=told)
         assert data.attrs["points_done"] == POINTS.count

@@ -1,4 +1,4 @@
-"""A sweep on a Dask cluster whose workers or client are killed: the numbers of one process to the bit."""
+"""Sweeps and fits on a Dask cluster whose workers or client are killed: the numbers of one process to the bit."""
 
 import signal
 import subprocess
@@ -10,10 +10,11 @@ import pytest
 import zarr
 
 import jaxdamp
+from jaxdamp import identify
 from jaxdamp.sweeps import points
 
 from .cases import decay
-from .on_cluster import BLOCK, FATAL, POINTS, at, ending
+from .on_cluster import BLOCK, DAMPERS, FATAL, POINTS, at, ending, start
 
 
 def _run(folder, kill):
@@ -47,3 +48,14 @@ def test_a_point_that_ends_workers_is_named_and_left_out(tmp_path):
         data = jaxdamp.sweep(ending, points(at, 2 * FATAL), file=tmp_path / "point.zarr")  # computes nothing more
     np.testing.assert_array_equal(np.flatnonzero(data["failed"]), [FATAL])
     np.testing.assert_array_equal(data["y"], np.where(data["failed"], np.nan, 2.0 * np.arange(2 * FATAL)))
+
+
+@pytest.mark.slow
+def test_fits_of_a_cluster_that_loses_a_worker_are_those_of_one_process(tmp_path):
+    ended = _run(tmp_path, "fits")
+    assert ended.returncode == 0, ended.stderr
+    fits = identify.fit_many(start(), DAMPERS, file=tmp_path / "fits.zarr")  # computes nothing more
+    here = identify.fit_many(start(), DAMPERS, file=tmp_path / "here.zarr")
+    assert fits.converged and len(fits) == 512
+    np.testing.assert_array_equal(fits.values, here.values)
+    np.testing.assert_array_equal(fits.standard_errors, here.standard_errors)

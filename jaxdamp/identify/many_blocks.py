@@ -1,0 +1,279 @@
+"""`fit_many` in blocks of dampers into a Zarr store, which many processes can fill and later calls go on with."""
+
+import hashlib
+import json
+import os
+import re
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, final
+
+import jax
+import numpy as np
+from filelock import FileLock
+
+from jaxdamp import _checks
+from jaxdamp._status import Status
+from jaxdamp.bench import BenchRun, DamperRecords
+from jaxdamp.blocks import AbstractWork, Blocks, BlockStore, Cluster, Variable, fill, stored_blocks
+from jaxdamp.identify.many_records import AllRecords, Beginning, begun_on, fitted_records, refuse_several_laws
+from jaxdamp.identify.many_result import ManyFits
+from jaxdamp.identify.starting import Start
+
+
+BLOCK = 64  # dampers: some seconds of work, and few enough records for any memory
+SETTLED = 8  # dampers from which numbers of them are rounded up to powers of two, each of which is compiled once
+ABSENT = "Its records were not among those of the call that came to its block."
+FLOAT = np.dtype(np.float64)
+NUMBERS = ("fit_percent", "rmse", "drift", "share_left_out")  # of each damper, beside values and standard errors
+
+
+@final
+class DamperFits(AbstractWork):
+    """Fits of the dampers in the rows of a store.
+
+    Arguments:
+        beginning: of all fits.
+        options: of `fit_many`.
+        records: of the dampers by name.
+        names: of the dampers by row; rows without one stay empty.
+    """
+
+    def __init__(
+        self, beginning: Beginning, options: Mapping[str, Any], records: AllRecords, names: Mapping[int, str]
+    ) -> None:
+        self._beginning, self._options = beginning, options
+        self._records, self._names = records, names
+
+    def part(self, indices: np.ndarray) -> "DamperFits":
+        """The work of some rows, with the records of their dampers, or what reads them."""
+        names = {row: self._names[row] for row in map(int, indices) if row in self._names}
+        there = [name for name in names.values() if name in self._records]
+        return DamperFits(self._beginning, self._options, _part(self._records, there), names)
+
+    def compute(self, indices: np.ndarray) -> Mapping[str, np.ndarray]:
+        """The fits of some rows as they are stored; a damper that cannot be read or fitted is left out, with why."""
+        results = self.without_results(indices, "")
+        places = {self._names[row]: place for place, row in enumerate(map(int, indices)) if row in self._names}
+        good: dict[str, tuple[BenchRun, ...]] = {}
+        for name, place in places.items():
+            try:
+                good[name] = self._checked(name)
+            except MemoryError:
+                raise
+            except Exception as error:
+                results["reason"][place] = _sentence(error)
+        for name, row in self._fitted(good).items():
+            for variable, value in row.items():
+                results[variable][places[name]] = value
+        results["failed"][:] = results["reason"] != ""
+        return results
+
+    def without_results(self, indices: np.ndarray, reason: str) -> dict[str, np.ndarray]:
+        """Rows that hold why there is no fit; those without a damper hold nothing."""
+        size, count = indices.size, len(self._beginning.free.names)
+        named = np.array([int(row) in self._names for row in indices])
+        empty = {name: np.full((size, count), np.nan) for name in ("values", "standard_errors")}
+        empty |= {name: np.full(size, np.nan) for name in NUMBERS}
+        texts = {name: np.full(size, "", dtype=object) for name in ("status", "record_rmse")}
+        reasons = np.where(named, reason, "").astype(object)
+        return {**empty, "steps": np.zeros(size, np.int32), **texts, "failed": reasons != "", "reason": reasons}
+
+    def _checked(self, name: str) -> tuple[BenchRun, ...]:
+        """The records of a damper that its fit takes."""
+        if name not in self._records:
+            raise ValueError(ABSENT)
+        runs = fitted_records(name, self._records[name], self._options)
+        refuse_several_laws(name, runs, self._beginning.model, self._options)
+        return runs
+
+    def _fitted(self, records: AllRecords) -> dict[str, dict[str, Any]]:
+        """What is stored of each damper; if the fit of all together raises, those of its halves, to leave one out."""
+        from jaxdamp.identify.many import fit_many  # which hands its blocks to this file
+
+        if not records:
+            return {}
+        names, begin = list(records), self._beginning
+        how = {**self._options, "rig": begin.rig, "freeze": begin.freeze, "bad_records": "keep"}
+        size = len(names) if len(names) < SETTLED else 2 ** (len(names) - 1).bit_length()
+        further = {f"{names[-1]} ({i})": records[names[-1]] for i in range(size - len(names))}  # compiles nothing new
+        try:
+            many = fit_many(begin.law, {**records, **further}, **how)
+        except MemoryError:
+            raise
+        except Exception as error:
+            if len(names) == 1:
+                return {names[0]: {"reason": _sentence(error)}}
+            halves = (names[: len(names) // 2], names[len(names) // 2 :])
+            return {k: row for half in halves for k, row in self._fitted({n: records[n] for n in half}).items()}
+        return {name: _row(many, place) for place, name in enumerate(names)}
+
+
+def _row(many: ManyFits, place: int) -> dict[str, Any]:
+    """What is stored of a damper."""
+    row = {name: getattr(many, name)[place] for name in ("values", "standard_errors", "fit_percent", "rmse", "steps")}
+    row |= {name: array[place] for name in ("drift", "share_left_out") if (array := getattr(many, name)).size}
+    errors = json.dumps(many.record_rmse[place].tolist() if many.record_rmse else [])
+    return row | {"status": many.status[place].name.lower(), "record_rmse": errors}
+
+
+def fit_into_store(
+    law: Start,
+    records: AllRecords,
+    settings: tuple[float, ...] | None,
+    path: str | os.PathLike[str] | None,
+    cluster: Cluster,
+    progress: Callable[[int, int], None] | None,
+    *,
+    shared: bool,
+    options: Mapping[str, Any],
+) -> ManyFits:
+    """Fit the dampers that a store lacks, and give the fits of all dampers of the call.
+
+    Arguments:
+        law: the start as it was given.
+        records: of the dampers.
+        settings: of the dampers.
+        path: of the store.
+        cluster: as in `jaxdamp.sweep`.
+        progress: as in `fit_many`.
+        shared: whether parameters are.
+        options: of the call besides.
+    """
+    if path is None or Path(path).suffix != ".zarr":
+        remedy = "Write `file='name.zarr'`, in a folder that all workers reach."
+        _checks.refuse("file", "end in '.zarr'", None if path is None else repr(str(path)), remedy)
+    if shared:
+        remedy = "Fit some dampers without `file` with it, then all with their law as the start and `freeze`."
+        _checks.refuse("shared", "be left out with `file`: blocks do not know each other", "given", remedy)
+    if settings is not None and len(settings) != len(records):
+        _checks.refuse("settings", f"be one number for each of {len(records)} dampers", f"{len(settings)} numbers")
+    beginning = begun_on(law, _first_readable(records, options), options)
+    place, identity = Path(path).expanduser().absolute(), _identity(beginning, options)
+    store, rows = _rows(place, identity, records, len(beginning.free.names))
+    names = {row: name for row, name in enumerate(store.read("name")["name"]) if name}
+    fill(store, DamperFits(beginning, options, records, names), cluster, progress, "Fitting", "rows for dampers")
+    found = store.read("values", "standard_errors", *NUMBERS, "steps", "status", "record_rmse", "reason")
+    found = {name: values[rows] for name, values in found.items()}
+    status = tuple(Status[text.upper()] if text else Status.LEFT_OUT for text in found.pop("status"))
+    reasons = tuple(
+        str(reason) or "its block is not done yet" * (s is Status.LEFT_OUT)
+        for reason, s in zip(found["reason"], status, strict=True)
+    )
+    errors = tuple(np.array(json.loads(text or "[]"), float) for text in found.pop("record_rmse"))
+    left = [name for name, reason in zip(records, found.pop("reason"), strict=True) if reason]
+    if left:
+        some = ", ".join(left[:5]) + ", …" * (len(left) > 5)
+        warnings.warn(
+            f"{len(left)} of {len(records)} dampers were left out: {some}. `many.remarks` says why.", stacklevel=5
+        )
+    return ManyFits(
+        names=tuple(records),
+        records=RecordsInOrder(records),
+        settings=settings,
+        free=beginning.free,
+        status=status,
+        reasons=reasons,
+        record_rmse=errors,
+        options={**options, "bad_records": "keep"},
+        **found,
+    )
+
+
+@final
+class RecordsInOrder(Sequence[tuple[BenchRun, ...]]):
+    """The records of dampers in their order, read when they are asked for."""
+
+    def __init__(self, records: AllRecords) -> None:
+        self._records, self._names = records, tuple(records)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __getitem__(self, place: Any) -> Any:
+        """The records of a damper, or of those of a slice."""
+        if isinstance(place, slice):
+            return RecordsInOrder(_part(self._records, self._names[place]))
+        return self._records[self._names[place]]
+
+
+def _rows(path: Path, identity: Mapping[str, str], records: AllRecords, count: int) -> tuple[BlockStore, np.ndarray]:
+    """The store, with a row for every damper of the call; new and changed ones are in further blocks at its end."""
+    variables = {
+        **{name: Variable({"parameter": count}, FLOAT, {}) for name in ("values", "standard_errors")},
+        **{name: Variable({}, FLOAT, {}) for name in NUMBERS},
+        **{name: Variable({}, str, {}) for name in ("name", "stamp", "status", "record_rmse", "reason")},
+        "steps": Variable({}, np.dtype(np.int32), {}),
+        "failed": Variable({}, np.dtype(bool), {}),
+    }
+    stamps = {name: _stamp(records, name) for name in records}
+    if not path.parent.is_dir():
+        _checks.refuse("file", "lie in a folder that exists", path, "Make the folder first.")
+    with FileLock(path.with_name(f".{path.name}.lock")):
+        blocks = stored_blocks(path)
+        known = _known(stamps) if not blocks else None
+        store = BlockStore(path, Blocks((blocks * BLOCK or len(known["name"]),), (BLOCK,)), identity)  # type: ignore
+        store.create(("damper",), variables, {}, known)
+        rows = _places(store)
+        new = {name: stamp for name, stamp in stamps.items() if (name, stamp) not in rows}
+        if new:
+            store = store.append(_known(new))
+            rows = _places(store)
+    return store, np.array([rows[pair] for pair in stamps.items()])
+
+
+def _places(store: BlockStore) -> dict[tuple[str, str], int]:
+    """The row of each damper with its stamp; those whose block was come to without their records have none."""
+    columns = zip(*store.read("name", "stamp", "reason").values(), strict=True)
+    return {(str(n), str(s)): row for row, (n, s, reason) in enumerate(columns) if n and reason != ABSENT}
+
+
+def _known(stamps: Mapping[str, str]) -> dict[str, np.ndarray]:
+    """Names and stamps of dampers in whole blocks."""
+    further = [""] * (-len(stamps) % BLOCK)
+    columns = {"name": [*stamps, *further], "stamp": [*stamps.values(), *further]}
+    return {name: np.array(column, dtype=object) for name, column in columns.items()}
+
+
+def _stamp(records: AllRecords, name: str) -> str:
+    """A text that changes whenever the records of a damper change; of records in memory by their numbers."""
+    if isinstance(records, DamperRecords):
+        return records.stamp(name)
+    digest = hashlib.sha256()
+    for run in records[name]:
+        for channel in (run.time, run.stroke, run.velocity, run.force, run.temperature, run.commands):
+            digest.update(b"-" if channel is None else np.ascontiguousarray(channel).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def _part(records: AllRecords, names: Iterable[str]) -> AllRecords:
+    return records.part(names) if isinstance(records, DamperRecords) else {name: records[name] for name in names}
+
+
+def _identity(beginning: Beginning, options: Mapping[str, Any]) -> dict[str, str]:
+    """What fits belong to: start and options, as texts."""
+    leaves, structure = jax.tree.flatten(beginning.free.tree)
+    digest = hashlib.sha256(re.sub(r" at 0x\w+", "", str(structure)).encode())
+    for leaf in leaves:
+        digest.update(np.asarray(leaf).tobytes() if isinstance(leaf, jax.Array | np.ndarray) else repr(leaf).encode())
+    start = f"{type(beginning.law).__name__} ({digest.hexdigest()[:12]})"
+    said = {name: str(value) for name, value in options.items() if name not in ("rig", "freeze")}
+    return {"start": start, "parameters": ", ".join(beginning.free.names), **said}
+
+
+def _sentence(error: Exception) -> str:
+    """Why a damper is left out, in a line."""
+    text = " ".join(str(error).split())
+    return text if isinstance(error, ValueError | OSError) and text else f"{type(error).__name__}: {text}"
+
+
+def _first_readable(records: AllRecords, options: Mapping[str, Any]) -> tuple[BenchRun, ...]:
+    """The records of the first damper that can be read, from which a law class starts."""
+    why = ""
+    for name in records:
+        try:
+            return fitted_records(name, records[name], options)
+        except Exception as error:
+            why = why or f"{name}: {_sentence(error)}"
+    _checks.refuse("dampers", "hold one whose records can be read", f"{len(records)} dampers without ({why})")

@@ -1,0 +1,147 @@
+"""Fits of many dampers in blocks into a store: those of one call in memory, whatever interrupts, fails or is added."""
+
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+import xarray
+
+from jaxdamp.bench import BenchRun, DamperRecords, SineTest, VirtualDyno
+from jaxdamp.dampers import Bilinear
+from jaxdamp.identify import Status, fit_many, many, many_blocks
+from jaxdamp.identify.many_blocks import DamperFits
+
+
+START = Bilinear(1500.0, 1500.0)
+TEST = SineTest(0.02, 1.0)
+TORN = 5
+
+
+def made(i: int) -> tuple[BenchRun, ...]:
+    """Records of a damper of a line; those of one are torn."""
+    if i == TORN:
+        raise ValueError(f"damper{i}.csv, line 3: no number")
+    law = Bilinear(2000.0 + 10.0 * (i % 7), 1200.0)
+    return tuple(VirtualDyno(law, force_noise=4.0, sampling_rate=100.0, seed=i).run(TEST))
+
+
+@pytest.fixture(autouse=True)
+def small_blocks(monkeypatch):
+    monkeypatch.setattr(many_blocks, "BLOCK", 8)
+
+
+@pytest.fixture
+def read(monkeypatch):
+    """The numbers of the dampers whose blocks are computed."""
+    names, compute = [], DamperFits.compute
+
+    def counted(work, indices):
+        names.extend(work._names[row] for row in indices if row in work._names)
+        return compute(work, indices)
+
+    monkeypatch.setattr(DamperFits, "compute", counted)
+    return names
+
+
+def test_fits_in_a_store_are_those_in_memory_and_a_torn_file_is_named(tmp_path, read):
+    dampers = DamperRecords(made, range(20), [f"No. {i}" for i in range(20)])
+    with pytest.warns(UserWarning, match=r"1 of 20 dampers were left out: No\. 5\."):
+        line = fit_many(START, dampers, file=tmp_path / "line.zarr")
+    others = {name: dampers[name] for name in dampers if name != "No. 5"}
+    expected = fit_many(START, others)
+    fitted = np.array([name in others for name in line.names])
+    for name in ("values", "standard_errors", "fit_percent", "rmse", "steps", "drift", "share_left_out"):
+        np.testing.assert_allclose(getattr(line, name)[fitted], getattr(expected, name), rtol=1e-8, atol=1e-12)
+    assert line.status[5] is Status.LEFT_OUT and not line.converged
+    assert line.remarks[5] == "it was left out: damper5.csv, line 3: no number" and line.unusual == ("No. 5",)
+    assert repr(line["No. 6"]) == repr(Bilinear(*line.values[6])) and line["No. 6"].fitted_to is not None
+    assert line.table().rows[5][1:-1] == (None,) * 6 and line.to_dict()["dampers"]["No. 5"]["fit"]["value"] is None
+    assert [len(errors) for errors in line.record_rmse] == [1] * 5 + [0] + [1] * 14
+    with pytest.raises(ValueError, match="name a damper that was fitted"):
+        _ = line["No. 5"]
+    lazy = xarray.open_zarr(tmp_path / "line.zarr", consolidated=False)
+    np.testing.assert_array_equal(lazy["values"][:20], line.values)
+    assert len(pickle.loads(pickle.dumps(line)).records[6]) == 1
+    read.clear()
+    with pytest.warns(UserWarning, match="left out"):
+        again = fit_many(START, dampers, file=tmp_path / "line.zarr")
+    np.testing.assert_array_equal(again.values, line.values)
+    assert not read
+
+
+def test_only_new_and_changed_dampers_are_fitted(tmp_path, read):
+    file, records = tmp_path / "line.zarr", {str(i): made(i) for i in range(5)}
+    first = fit_many(Bilinear, records, file=file)
+    assert read == list("01234")
+    read.clear()
+    changed = {**records, "3": made(4), "9": made(9)}
+    del changed["1"]  # the others stay what they are
+    line = fit_many(Bilinear, changed, file=file)
+    assert read == ["3", "9"] and line.names == ("0", "2", "3", "4", "9")
+    np.testing.assert_array_equal(line.values[:2], first.values[[0, 2]])
+    np.testing.assert_allclose(line.values[2], first.values[4], rtol=1e-6)
+    assert np.array_equal(fit_many(Bilinear, records, file=file).values, first.values)
+
+
+def test_an_interrupted_fit_goes_on_and_parts_share_a_store(tmp_path, read, monkeypatch):
+    file, dampers = tmp_path / "line.zarr", DamperRecords(made, range(8, 28))
+    stopping = _Interrupting(17, many_blocks.fitted_records)
+    monkeypatch.setattr(many_blocks, "fitted_records", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        fit_many(START, dampers, file=file)
+    stopping.at = -1
+    read.clear()
+    line = fit_many(START, dampers, file=file, cluster="2/3")
+    assert read == [str(i) for i in range(16, 24)]
+    assert line.reasons[-1] == "its block is not done yet" and line.status[-1] is Status.LEFT_OUT
+    told = []
+    with ThreadPoolExecutor(2) as pool:
+        line = fit_many(START, dampers, file=file, cluster=pool, progress=lambda *done: told.append(done))
+    assert line.converged and told == [(24, 24)]
+    np.testing.assert_array_equal(line.values, fit_many(START, dampers, file=tmp_path / "other.zarr").values)
+
+
+class _Interrupting:
+    """Stops where the records of a damper are looked at."""
+
+    def __init__(self, at, function):
+        self.at, self.function = at, function
+
+    def __call__(self, name, runs, options):
+        if name == str(self.at):
+            raise KeyboardInterrupt
+        return self.function(name, runs, options)
+
+
+def test_a_damper_whose_fit_raises_is_left_out_alone(tmp_path, monkeypatch):
+    def raising(law, dampers, **options):
+        if "2" in dampers:
+            raise FloatingPointError("not finite")
+        return fit_many(law, dampers, **options)
+
+    monkeypatch.setattr(many, "fit_many", raising)
+    with pytest.warns(UserWarning, match="1 of 5 dampers were left out: 2"):
+        result = fit_many(START, DamperRecords(made, range(5)), file=tmp_path / "line.zarr")
+    assert result.reasons == ("", "", "FloatingPointError: not finite", "", "")
+    assert np.all(np.isfinite(result.values).sum(axis=1) == [2, 2, 0, 2, 2])
+
+
+def test_what_a_store_does_not_suit_is_refused(tmp_path):
+    file, dampers = tmp_path / "line.zarr", DamperRecords(made, range(3))
+    fit_many(START, dampers, file=file)
+    for law, options, message in (
+        (Bilinear(1600.0, 1500.0), {}, r"other work: start is Bilinear \(\w+\) there"),
+        (START, {"loss": "soft_l1"}, "loss is squares there, soft_l1 now"),
+        (START, {"rig": "gas"}, "parameters is rebound_rate, compression_rate there"),
+        (START, {"shared": ["rebound_rate"]}, "`shared` must be left out with `file`"),
+        (START, {"settings": [1.0]}, "one number for each of 3 dampers"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            fit_many(law, dampers, file=file, **options)
+    with pytest.raises(ValueError, match=r"`file` must end in '\.zarr'"):
+        fit_many(START, dampers, cluster="1/2")
+    with pytest.raises(ValueError, match=r"lie in a folder that exists"):
+        fit_many(START, dampers, file=tmp_path / "none" / "line.zarr")
+    with pytest.raises(ValueError, match=r"one whose records can be read, but is 1 dampers without .*line 3"):
+        fit_many(START, DamperRecords(made, [TORN]), file=tmp_path / "torn.zarr")
