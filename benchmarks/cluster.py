@@ -19,7 +19,7 @@ from distributed import Client, LocalCluster
 import jaxdamp
 from benchmarks._timing import report
 from jaxdamp import Ride, roads, sweeps, vehicles
-from jaxdamp.blocks.store import LARGEST
+from jaxdamp.blocks.cutting import LARGEST
 from jaxdamp.dampers import Besinger
 
 

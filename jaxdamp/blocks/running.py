@@ -19,7 +19,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress, tell
-from jaxdamp.blocks.store import BlockStore
+from jaxdamp.blocks.store import AbstractStore
 
 
 @runtime_checkable
@@ -67,7 +67,7 @@ class _Job(NamedTuple):
     double: bool  # precision
 
 
-def run_blocks(work: AbstractWork, store: BlockStore, cluster: Cluster, on_block: Callable[[int], None]) -> None:
+def run_blocks(work: AbstractWork, store: AbstractStore, cluster: Cluster, on_block: Callable[[int], None]) -> None:
     """Compute and write the blocks that are not done.
 
     Arguments:
@@ -89,7 +89,7 @@ def run_blocks(work: AbstractWork, store: BlockStore, cluster: Cluster, on_block
 
 
 def fill(
-    store: BlockStore,
+    store: AbstractStore,
     work: AbstractWork,
     cluster: Cluster,
     progress: Callable[[int, int], None] | None,
@@ -150,13 +150,13 @@ class _Workers:
         """The work as it travels, with every block: no copy is lost with its worker."""
         return self._job or _packed(self._work.part(indices))
 
-    def block(self, store: BlockStore, number: int) -> "Future[int]":
+    def block(self, store: AbstractStore, number: int) -> "Future[int]":
         """Compute and write a block; gives the number of its points."""
         return self._executor.submit(_block, self.job(store.blocks.indices(number)), store, number)
 
 
 def _by_workers(
-    work: AbstractWork, store: BlockStore, workers: _Workers, left: list[int], on_block: Callable[[int], None]
+    work: AbstractWork, store: AbstractStore, workers: _Workers, left: list[int], on_block: Callable[[int], None]
 ) -> None:
     """Compute the blocks on workers; those that end workers last, by processes of this one, which only they can hit."""
     fatal = []
@@ -181,7 +181,7 @@ def _by_workers(
         on_block(indices.size)
 
 
-def _in_turn(workers: _Workers, store: BlockStore, left: list[int]) -> Iterator[tuple[int, Future[int]]]:
+def _in_turn(workers: _Workers, store: AbstractStore, left: list[int]) -> Iterator[tuple[int, Future[int]]]:
     """The blocks as they end, few of them submitted at a time; whoever stops cancels the others."""
     waiting, active = iter(left), {}
     missing_since = np.inf  # when no worker was there for the first time, of this absence
@@ -305,7 +305,7 @@ def _points(job: _Job, indices: np.ndarray) -> Results:
             jax.config.update("jax_enable_x64", before)
 
 
-def _block(job: _Job, store: BlockStore, number: int) -> int:
+def _block(job: _Job, store: AbstractStore, number: int) -> int:
     """Compute and write a block, in a worker; returns the number of its points."""
     indices = store.blocks.indices(number)
     store.write(number, _points(job, indices))

@@ -1,11 +1,11 @@
 """A Zarr store of labelled results that is at any time what is done, block by block."""
 
-import dataclasses
 import errno
 import json
 import os
 import shutil
 import tempfile
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
@@ -15,76 +15,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._types import Dataset
-
-
-LARGEST = 2**15  # points of a block: a quarter car of 10 s takes some seconds for so many
-FEWEST = 16  # blocks of a large sweep, so that a few workers can share them
-SMALLEST = 256  # points of a block of a small sweep, as many as a processor takes side by side
-
-
-def block_size(count: int) -> int:
-    """Points of a block. It depends on the size of the sweep alone, so that any machine goes on with any store.
-
-    Arguments:
-        count: number of points of the sweep.
-
-    >>> block_size(1000), block_size(131_072), block_size(10**9)
-    (256, 8192, 32768)
-    """
-    return min(max(2 ** (-(-count // FEWEST) - 1).bit_length(), SMALLEST), LARGEST)
-
-
-@final
-@dataclasses.dataclass(frozen=True)
-class Blocks:
-    """A grid cut into boxes of equal shape; those at the ends of the axes may be smaller.
-
-    Attributes:
-        shape: number of points along each axis.
-        box: of a block.
-
-    >>> blocks = Blocks.of((3, 4), 6)
-    >>> blocks.box, blocks.count, blocks.indices(1)
-    ((1, 4), 3, array([4, 5, 6, 7]))
-    """
-
-    shape: tuple[int, ...]
-    box: tuple[int, ...]
-
-    @classmethod
-    def of(cls, shape: tuple[int, ...], size: int) -> "Blocks":
-        """Blocks of at most `size` points, which run on along the last axes."""
-        box, room = list(shape), size
-        for axis in reversed(range(len(shape))):
-            pieces = -(-shape[axis] // room)
-            box[axis] = -(-shape[axis] // pieces)
-            room = max(room // box[axis], 1)
-        return cls(shape, tuple(box))
-
-    @property
-    def numbers(self) -> tuple[int, ...]:
-        """Blocks along each axis."""
-        return tuple(-(-n // b) for n, b in zip(self.shape, self.box, strict=True))
-
-    @property
-    def count(self) -> int:
-        """Number of blocks."""
-        return int(np.prod(self.numbers))
-
-    def region(self, number: int) -> tuple[slice, ...]:
-        """The part of the grid that a block covers."""
-        places = np.unravel_index(number, self.numbers)
-        ends = zip(places, self.box, self.shape, strict=True)
-        return tuple(slice(int(i) * b, min((int(i) + 1) * b, n)) for i, b, n in ends)
-
-    def size(self, number: int) -> int:
-        """How many points a block has."""
-        return int(np.prod([part.stop - part.start for part in self.region(number)]))
-
-    def indices(self, number: int) -> np.ndarray:
-        """The numbers of its points in the order of the grid, where the last axis runs fastest."""
-        ranges = [np.arange(part.start, part.stop) for part in self.region(number)]
-        return np.ravel_multi_index(np.ix_(*ranges), self.shape).ravel()
+from jaxdamp.blocks.cutting import Blocks
 
 
 if TYPE_CHECKING:
@@ -112,8 +43,32 @@ class Variable(NamedTuple):
     attributes: dict[str, str]
 
 
+class AbstractStore(ABC):
+    """Takes the results of blocks of points, and knows which are done.
+
+    Attributes:
+        path: where what is done lies.
+        blocks: of the points.
+    """
+
+    path: Path
+    blocks: Blocks
+
+    @abstractmethod
+    def left(self) -> np.ndarray:
+        """The blocks that are not done."""
+
+    @abstractmethod
+    def repair(self) -> int:
+        """Blocks that are not as they were written are not done; gives how many."""
+
+    @abstractmethod
+    def write(self, number: int, values: Mapping[str, np.ndarray]) -> None:
+        """Take the results of a block, which is done then."""
+
+
 @final
-class BlockStore:
+class BlockStore(AbstractStore):
     """Arrays along the points of a grid, one chunk a block, each with a checksum, and a mark for each finished block.
 
     No two blocks share a chunk, chunks are renamed into place when they are whole, and the mark of a block is written
@@ -220,10 +175,10 @@ class BlockStore:
         more._names = self._names
         return more
 
-    def read(self, *names: str) -> dict[str, np.ndarray]:
-        """Whole variables."""
-        group = _zarr().open_group(self.path, mode="r")
-        return {name: np.asarray(group[name][: self.blocks.shape[0]]) for name in names}
+    def read(self, *names: str, start: int = 0, stop: int | None = None) -> dict[str, np.ndarray]:
+        """Variables of all points along the first axis, or of some."""
+        group, stop = _zarr().open_group(self.path, mode="r"), self.blocks.shape[0] if stop is None else stop
+        return {name: np.asarray(group[name][start:stop]) for name in names}
 
     def _check(self) -> None:
         """Refuse a store of something else, with what differs."""

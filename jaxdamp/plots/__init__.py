@@ -41,6 +41,7 @@ from jaxdamp.plots.roughness import (
     roughness_spectrum as roughness_spectrum,
 )
 from jaxdamp.plots.sensitivities import record_sensitivity as record_sensitivity, sensitivity, valving
+from jaxdamp.plots.sweep_summaries import sweep_summary as sweep_summary
 from jaxdamp.plots.sweeps import sweep
 
 

@@ -4,10 +4,12 @@ from jaxdamp.sweeps.accessor import without_effect as without_effect
 from jaxdamp.sweeps.axes import points, random, sobol
 from jaxdamp.sweeps.block_program import block_program
 from jaxdamp.sweeps.function import SweepFunction as SweepFunction
+from jaxdamp.sweeps.summary import Summary, SweepSummary as SweepSummary
 from jaxdamp.sweeps.sweeping import sweep
 
 
 __all__ = [
+    "Summary",
     "block_program",
     "points",
     "random",

@@ -79,11 +79,24 @@ class BlockProgram(AbstractWork):
         listed = {} if isinstance(self._computation.points, Grid) else self._computation.points.columns(indices)
         return {**table.values, **listed, "failed": table.failed, "reason": reasons}
 
-    def store(self, path: str) -> BlockStore:
-        """The store of this sweep, made if it is not there; refused if it is of another sweep."""
-        computation, points = self._computation, self._computation.points
-        traced, about = computation.traced, computation.empty(np.arange(1)).about
-        identity = {
+    @property
+    def points(self) -> AbstractPoints:
+        """The points."""
+        return self._computation.points
+
+    @property
+    def scalars(self) -> list[str]:
+        """The results that are one number."""
+        return [name for name, result in self._computation.traced.results.items() if not result.shape]
+
+    def about(self, name: str) -> dict[str, str]:
+        """The unit of a result or an axis."""
+        return self._computation.empty(np.arange(1)).about(name)
+
+    def identity(self) -> dict[str, str]:
+        """What results belong to, as texts by name."""
+        points, traced = self._computation.points, self._computation.traced
+        return {
             "axes": ", ".join(f"{name} ({size})" for name, size in points.shape.items())
             + ("" if isinstance(points, Grid) else f": {', '.join(points.names)}"),
             "values of the axes": _digest(points),
@@ -91,6 +104,10 @@ class BlockProgram(AbstractWork):
             "function": traced.fingerprint()[:16],
             "jax": jax.__version__,
         }
+
+    def store(self, path: str) -> BlockStore:
+        """The store of this sweep, made if it is not there; refused if it is of another sweep."""
+        points, traced, about = self._computation.points, self._computation.traced, self.about
         variables = {
             name: Variable(_inner_dims(name, r.shape, set(traced.slopes.values())), r.dtype, about(name))
             for name, r in traced.results.items()
@@ -101,7 +118,7 @@ class BlockProgram(AbstractWork):
             coordinates = {name: (name, values, about(name)) for name, values in points.values.items()}
         else:
             variables |= {name: Variable({}, np.dtype(np.float64), about(name)) for name in points.names}
-        store = BlockStore(path, self.blocks, identity)
+        store = BlockStore(path, self.blocks, self.identity())
         store.create(tuple(points.shape), variables, coordinates)
         return store
 

@@ -7,7 +7,7 @@ import warnings
 import zlib
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from pathlib import Path
-from typing import final
+from typing import final, overload
 
 import jax
 import numpy as np
@@ -19,10 +19,11 @@ from jaxdamp._types import DataArray, Dataset
 from jaxdamp._writing import whole
 from jaxdamp.blocks import Cluster
 from jaxdamp.sweeps.axes import AbstractPoints, as_points
-from jaxdamp.sweeps.block_program import sweep_into_store
+from jaxdamp.sweeps.block_program import BlockProgram, sweep_into_store
 from jaxdamp.sweeps.function import Gradients, PointFunction
 from jaxdamp.sweeps.program import quiet
 from jaxdamp.sweeps.running import COMPILED, Computation
+from jaxdamp.sweeps.summary import Summary, SweepSummary, summarise
 from jaxdamp.sweeps.table import Table, extent
 
 
@@ -33,6 +34,32 @@ CHECKSUMS = "checksums"  # attribute: of each block of points
 BLOCK = 4096  # points
 
 
+@overload
+def sweep(
+    function: PointFunction,
+    over: Mapping[str, object] | AbstractPoints,
+    *,
+    chunk: int | None = None,
+    devices: int | Sequence[object] | None = None,
+    gradients: Gradients = False,
+    file: str | os.PathLike[str] | None = None,
+    cluster: Cluster = None,
+    summary: None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Dataset: ...
+@overload
+def sweep(
+    function: PointFunction,
+    over: Mapping[str, object] | AbstractPoints,
+    *,
+    chunk: int | None = None,
+    devices: int | Sequence[object] | None = None,
+    gradients: Gradients = False,
+    file: str | os.PathLike[str] | None = None,
+    cluster: Cluster = None,
+    summary: Summary,
+    progress: Callable[[int, int], None] | None = None,
+) -> SweepSummary: ...
 @of_known_numbers
 def sweep(
     function: PointFunction,
@@ -43,8 +70,9 @@ def sweep(
     gradients: Gradients = False,
     file: str | os.PathLike[str] | None = None,
     cluster: Cluster = None,
+    summary: Summary | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> Dataset:
+) -> "Dataset | SweepSummary":
     """Compute a function at every point of a grid, a list or a sample: all cores, or all GPUs, many points at a time.
 
     A point at which a result is not finite, or at which the function raises while it runs (`equinox.error_if`), does
@@ -76,13 +104,17 @@ def sweep(
         cluster: who computes the blocks of a `.zarr` store, all of this machine's devices if left out: a Dask `Client`,
             an executor of `concurrent.futures`, or a part of an array job such as "3/16", which leaves the other parts
             to calls in other processes.
+        summary: what is kept instead of all results: statistics, and the histograms, best points and Pareto set that a
+            `sweeps.Summary` names, gathered block by block, so that 1e9 points take the memory of a block. A `.zarr`
+            store then has one text for each block.
         progress: called with the number of points done and of all points; a line in the terminal if it is left out.
 
     Returns:
         The results by name with the axes as dimensions (for a list, along `point`). Of a `Ride`, `attrs["loop"]` says
         by what its loop was compiled at the end: XLA, or the C compiler where a long sweep found that to be faster; the
         numbers are the same to rounding. From a `.zarr` store they are read when they are asked for, and
-        `attrs["points_done"]` counts those that are done; each process chooses its loop, which is not noted.
+        `attrs["points_done"]` counts those that are done; each process chooses its loop, which is not noted. With
+        `summary`, a `SweepSummary` of the points that are done.
 
     Raises:
         ValueError: axes that are no numbers, a function that does not know an axis or returns no named numbers, no
@@ -98,11 +130,14 @@ def sweep(
     if gradients not in (False, True, "forward", "reverse"):
         _checks.refuse("gradients", "be False, True, 'forward' or 'reverse'", repr(gradients))
     computation = Computation(function, as_points(over), gradients, chunk, devices)
+    if cluster is not None or (file is not None and summary is not None):
+        remedy = "Write `file='name.zarr'`, in a folder that all workers reach."
+        if file is None or Path(file).suffix != ".zarr":
+            _checks.refuse("file", "end in '.zarr', so that it can be written block by block", file, remedy)
+    if summary is not None:
+        return summarise(BlockProgram(computation), summary, None if file is None else str(file), cluster, progress)
     if file is not None and Path(file).suffix == ".zarr":
         return sweep_into_store(computation, str(file), cluster, progress)
-    if cluster is not None:
-        remedy = "Write `file='name.zarr'`, in a folder that all workers reach."
-        _checks.refuse("file", "end in '.zarr' where a cluster computes, so that workers can write it", file, remedy)
     table, count = computation.empty(), computation.points.count
     stored = None if file is None else SweepFile(file, table)
     if stored is not None:
