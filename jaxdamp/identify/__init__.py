@@ -4,6 +4,7 @@ from jaxdamp._guesses import answer_guesses
 from jaxdamp._status import Status
 from jaxdamp.identify.bayes import Posterior as Posterior, Spread as Spread
 from jaxdamp.identify.comparing import Comparison as Comparison, compare, fit_each as fit_each
+from jaxdamp.identify.control_charts import AbstractChart as AbstractChart, Cusum, Ewma, Shewhart
 from jaxdamp.identify.cross_validation import CrossValidation as CrossValidation, cross_validate
 from jaxdamp.identify.design_goal import MachineLimits
 from jaxdamp.identify.designing import ExperimentDesign as ExperimentDesign, design_experiment, extent as extent
@@ -21,6 +22,7 @@ from jaxdamp.identify.ladder import (
     suited_laws as suited_laws,
 )
 from jaxdamp.identify.law_result import FitResult as FitResult
+from jaxdamp.identify.line import ControlCharts as ControlCharts, control_charts
 from jaxdamp.identify.machine import (
     OFFSET as OFFSET,
     machine_names as machine_names,
@@ -58,11 +60,15 @@ from jaxdamp.identify.vehicle_result import ChannelScore as ChannelScore, Vehicl
 
 
 __all__ = [
+    "Cusum",
+    "Ewma",
     "LearntStart",
     "MachineLimits",
     "Problem",
+    "Shewhart",
     "Status",
     "compare",
+    "control_charts",
     "cross_validate",
     "default_ladder",
     "design_experiment",

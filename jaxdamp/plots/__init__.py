@@ -9,6 +9,7 @@ from jaxdamp.plots._style import ROLES, STYLE
 from jaxdamp.plots.animation import animation as animation
 from jaxdamp.plots.cards import law_card
 from jaxdamp.plots.changes import tuning
+from jaxdamp.plots.control_charts import control_charts as control_charts
 from jaxdamp.plots.curves import force_velocity, force_velocity_family as force_velocity_family
 from jaxdamp.plots.damper_sheet import damper_sheet as damper_sheet
 from jaxdamp.plots.errors import cross_validation as cross_validation, ladder

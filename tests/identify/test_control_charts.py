@@ -1,0 +1,115 @@
+"""Control charts: average run lengths beside closed forms, published ones and runs of the charts; lines of dampers."""
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from jaxdamp.bench import SineTest, VirtualDyno
+from jaxdamp.dampers import Bilinear
+from jaxdamp.identify import Cusum, Ewma, Shewhart, control_charts, fit_many
+from jaxdamp.identify.control_charts import AbstractChart, signals
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.4, 1.5])
+def test_run_lengths_that_have_a_closed_form(shift):
+    individuals = 1.0 / (norm.sf(3.0 - shift) + norm.cdf(-3.0 - shift))
+    assert Shewhart().average_run_length(shift) == pytest.approx(individuals, rel=1e-12)
+    assert Ewma(1.0, 3.0).average_run_length(shift) == pytest.approx(individuals, rel=1e-8)
+    sums = 1.0 / (norm.sf(2.0 - shift) + norm.sf(2.0 + shift))  # without a memory
+    assert Cusum(2.0, 1e-9).average_run_length(shift) == pytest.approx(sums, rel=1e-6)
+
+
+@pytest.mark.parametrize("shift", [0.5, 1.0, 1.5])
+def test_run_lengths_of_sums_are_near_those_of_siegmund(shift):
+    def one_side(drift):
+        b = 5.0 + 1.166
+        return (np.exp(-2.0 * drift * b) + 2.0 * drift * b - 1.0) / (2.0 * drift**2) if drift else b**2
+
+    expected = 1.0 / (1.0 / one_side(shift - 0.5) + 1.0 / one_side(-shift - 0.5))
+    assert Cusum().average_run_length(shift) == pytest.approx(expected, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("chart", "published"),  # Montgomery, Statistical Quality Control, 7th ed., tables 9.3 and 9.11
+    [
+        (Cusum(0.5, 5.0), {0.0: 465.0, 0.5: 38.0, 1.0: 10.4, 2.0: 4.01}),
+        (Cusum(0.5, 4.0), {0.0: 168.0, 0.5: 26.6, 1.0: 8.38, 2.0: 3.34}),
+        (Ewma(0.2, 2.962), {0.0: 500.0, 0.5: 41.8, 1.0: 10.5, 2.0: 3.7}),
+        (Ewma(0.1, 2.814), {0.0: 500.0, 0.5: 31.3, 1.0: 10.3, 2.0: 4.4}),
+    ],
+)
+def test_published_run_lengths(chart, published):
+    for shift, length in published.items():
+        assert chart.average_run_length(shift) == pytest.approx(length, rel=0.012)
+
+
+@pytest.mark.parametrize("chart", [Shewhart(2.0), Ewma(0.2, 2.2), Cusum(0.5, 3.0)], ids=lambda chart: chart.name)
+def test_charts_run_as_long_as_they_say(chart: AbstractChart):
+    rng, lengths = np.random.default_rng(5), []
+    for _ in range(400):
+        out = np.flatnonzero(signals(chart, 0.3 + rng.standard_normal(400)))
+        lengths.append(out[0] + 1)  # raises if none
+    mean, spread = np.mean(lengths), np.std(lengths) / np.sqrt(len(lengths))
+    assert abs(mean - chart.average_run_length(0.3)) < 4.0 * spread
+
+
+def test_numbers_that_are_missing_change_nothing():
+    scores = np.array([1.0, np.nan, 4.0, -9.0, np.nan, 0.2, 3.0, 3.0])
+    for chart in (Shewhart(), Ewma(0.5, 2.0), Cusum(0.5, 4.0)):
+        there = np.isfinite(scores)
+        np.testing.assert_array_equal(signals(chart, scores)[there], signals(chart, scores[there]))
+        assert not signals(chart, scores)[~there].any()
+
+
+def test_a_drift_is_found_and_a_mended_cause_ends_the_signals():
+    rng = np.random.default_rng(2)
+    force = 1500.0 + 6.0 * rng.standard_normal(400)
+    force[200:260] += 9.0
+    found = control_charts({"force": force, "other": -force}, baseline=100)
+    assert found.deviation[0] == pytest.approx(6.0, rel=0.15) and found.since("force") == ""
+    cusum = found.signals["force"][2]
+    assert cusum[215:260].all() and np.all(cusum[215:260] == 1) and not cusum[300:].any()
+    np.testing.assert_array_equal(cusum, -found.signals["other"][2])
+    late = control_charts({"force": force[:250]}, baseline=100)
+    assert 199 <= int(late.since("force")) <= 204 and f"force since '{late.since('force')}'" in late.summary
+    assert len(found.table().rows) == 400 and found.table().rows[230][3].startswith("force: ")
+    rates = sum(1.0 / chart.average_run_length() for chart in found.charts)
+    assert found.false_alarms == pytest.approx(800 * rates)
+
+
+def test_a_line_of_fitted_dampers_is_charted_as_it_grows(tmp_path):
+    def made(i):
+        law = Bilinear(2000.0 + (150.0 if i == 35 else 0.0) + 7.0 * np.sin(12.9898 * i**2), 1200.0)
+        return VirtualDyno(law, force_noise=4.0, sampling_rate=100.0, seed=i).run(SineTest(0.02, 1.0))
+
+    records, file = {f"No. {i}": made(i) for i in range(40)}, tmp_path / "line.zarr"
+    morning = fit_many(Bilinear, {name: records[name] for name in list(records)[:30]}, file=file)
+    before = control_charts(morning, baseline=30)
+    found = control_charts(fit_many(Bilinear, records, file=file), baseline=list(morning.names))
+    np.testing.assert_array_equal(found.centre, before.centre)
+    assert found.names[35] == "No. 35" and found.quantities == {"rebound_rate": "N s/m", "compression_rate": "N s/m"}
+    assert found.signals["rebound_rate"][0, 35] == 1 and not found.signals["rebound_rate"][0, :35].any()
+    assert found.fit_share[0] < 0.5 < found.fit_share[1] and "compression_rate: the error of the fits" in " ".join(
+        found.warnings
+    )
+    page = found.report(tmp_path / "line.html").read_text()
+    assert "No. 35" in page and "individuals high" in page and "until a signal" in page
+
+
+def test_what_cannot_be_charted_is_refused():
+    force = np.random.default_rng(0).standard_normal(30)
+    for dampers, baseline, options, message in (
+        ([1.0], 10, {}, "`dampers` must be the result of `fit_many`"),
+        ({"a": force, "b": force[1:]}, 10, {}, r"dampers\['b'\]` must be one number for each of 30"),
+        ({"a": force}, 3, {}, "`baseline` must be from 8 to 30 dampers"),
+        ({"a": force}, ["7", "x"], {}, "`baseline` must be one of"),
+        ({"a": force * 0.0}, 10, {}, "8 or more dampers that determine 'a' and are not all alike"),
+        ({"a": force}, 10, {"names": ["a"]}, "`names` must be one for each of 30 dampers"),
+        ({"a": force}, 10, {"charts": ["EWMA"]}, r"`charts\[0\]` must be a chart"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            control_charts(dampers, baseline, **options)
+    with pytest.raises(ValueError, match="`weight` must be above 0 and at most 1"):
+        Ewma(1.2)
+    with pytest.raises(ValueError, match="`decision`"):
+        Cusum(0.5, 0.0)
