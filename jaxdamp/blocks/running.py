@@ -11,7 +11,7 @@ import time
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from typing import NamedTuple, Protocol, final, runtime_checkable
 
 import jax
@@ -144,7 +144,13 @@ class _Workers:
     def count(self) -> int:
         """How many blocks can be computed at a time."""
         threads = getattr(self._cluster, "nthreads", None)
-        return os.cpu_count() or 1 if threads is None else sum(threads().values())
+        try:
+            return os.cpu_count() or 1 if threads is None else sum(threads().values())
+        except Exception as error:  # what a client raises that has no scheduler depends on how it lost it
+            raise RuntimeError(
+                "The client is closed, or its scheduler has ended. Blocks that are done are in the store: make a new "
+                f"client, and the same call goes on from there. ({type(error).__name__}: {error})"
+            ) from error
 
     def job(self, indices: np.ndarray) -> _Job:
         """The work as it travels, with every block: no copy is lost with its worker."""
@@ -163,6 +169,11 @@ def _by_workers(
     for number, future in _in_turn(workers, store, left):
         try:
             on_block(future.result())
+        except CancelledError as error:
+            raise RuntimeError(
+                f"Block {number} was cancelled: by someone, or because the client was closed or its scheduler ended. "
+                f"What is done is in {store.path}, and the same call with a working client goes on from there."
+            ) from error
         except BrokenExecutor as error:
             raise RuntimeError(
                 f"A process of the pool ended while it computed block {number} or one of those beside it. What is "

@@ -11,6 +11,7 @@ from jaxdamp.tune import DamperComparison, Rescore
 
 _COLUMNS = 3  # of panels
 _BINS = 30
+_NAMED = 40  # dampers whose names have room
 
 
 def many_fits(result: ManyFits) -> Figure:
@@ -34,7 +35,7 @@ def many_fits(result: ManyFits) -> Figure:
         _style.dress(axes, label, f"[{units[number] or '–'}]", name)
     panels[-1].plot(places, result.rmse, "o", color=_style.COLOURS[1], markersize=4)
     _style.dress(panels[-1], label, "[N]", "root of the mean squared force error")
-    if result.settings is None:
+    if result.settings is None and len(result.names) <= _NAMED:
         for axes in panels:
             axes.set_xticks(places, result.names, rotation=30, ha="right")
     figure.suptitle(f"{len(result.names)} dampers, with 95 % intervals")

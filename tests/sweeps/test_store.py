@@ -232,6 +232,40 @@ def test_a_cluster_without_workers_is_not_waited_for(tmp_path, monkeypatch):
         jaxdamp.sweep(product, points(at, COUNT), file=tmp_path / "s.zarr", cluster=_Gone())
 
 
+class _Lost(_Gone):
+    """A client that is closed after some blocks, or whose tasks somebody cancels."""
+
+    def __init__(self, closed):
+        super().__init__()
+        self.closed = closed
+
+    def nthreads(self):
+        if self.closed and self.asked:
+            raise AttributeError("'NoneType' object has no attribute 'ncores'")
+        return {"a": 1}
+
+    def submit(self, fn, *args, **_):
+        self.asked, future = self.asked + 1, Future()
+        if self.asked == 1:
+            future.set_result(fn(*args))
+        elif not self.closed:
+            future.cancel()
+            future.set_running_or_notify_cancel()
+        return future
+
+
+@pytest.mark.parametrize(
+    ("closed", "message"),
+    [(True, "The client is closed, or its scheduler"), (False, r"Block \d was cancelled: .*s\.zarr")],
+)
+def test_a_client_that_ends_is_named_and_what_is_done_stays(tmp_path, closed, message):
+    file, over = tmp_path / "s.zarr", points(at, COUNT)
+    with pytest.raises(RuntimeError, match=message):
+        jaxdamp.sweep(product, over, file=file, cluster=_Lost(closed))
+    assert np.count_nonzero(np.asarray(zarr.open_group(file, mode="r")["done"]) >= 0) == 1
+    assert jaxdamp.sweep(product, over, file=file).attrs["points_done"] == COUNT
+
+
 class NoClient:
     """What looks like a Dask client, and is none."""
 
