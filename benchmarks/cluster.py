@@ -1,26 +1,32 @@
 """What blocks in a store cost: beside one sweep in memory, by Dask workers, and the memory of the client.
 
     python -m benchmarks.cluster
+    python -m benchmarks.cluster fits --dampers 20000
 
 Quarter cars with a Besinger damper, 10 s at 1 kHz: blocks of 32768 cars, processor time of all processes. Memory:
 the largest resident size of a process that sweeps a product over 1e5 to 1e8 points, which are drawn block by block.
+Fits: so many virtual dampers, made and fitted in blocks by this process, then by two workers of which one is killed
+after a tenth; the numbers must be equal to the bit.
 """
 
+import argparse
 import os
+import signal
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 
+import numpy as np
 import psutil
 from distributed import Client, LocalCluster
 
 import jaxdamp
 from benchmarks._timing import report
-from jaxdamp import Ride, roads, sweeps, vehicles
+from jaxdamp import Ride, bench, identify, roads, sweeps, vehicles
 from jaxdamp.blocks.cutting import LARGEST
-from jaxdamp.dampers import Besinger
+from jaxdamp.dampers import Besinger, Bilinear
 
 
 BLOCKS = 4, 12  # of two sweeps, whose difference compiles nothing
@@ -82,7 +88,49 @@ def memory(count: int, folder: Path) -> float:
     return float(ended.stdout.split()[-1])
 
 
+def made(i: int) -> bench.BenchSet:
+    """Records of damper i of a line."""
+    law = Bilinear(2000.0 + i % 100, 1200.0)
+    return bench.VirtualDyno(law, force_noise=4.0, sampling_rate=200.0, seed=i).run(bench.SineTest(0.02, 1.0))
+
+
+def fits(count: int, folder: Path) -> list[list[object]]:
+    """Wall and processor time of the fits, by who computes them, and the memory of this process."""
+    jaxdamp.configure(cache=False)
+    rows, results = [], []
+
+    def measured(name: str, workers: list[int], **options) -> None:
+        few, start = bench.DamperRecords(made, range(128)), Bilinear(1500.0, 1500.0)
+        identify.fit_many(start, few, file=folder / f"{name} compiles.zarr", **options)
+        records = bench.DamperRecords(made, range(count))
+
+        def told(done: int, total: int) -> None:
+            if workers and done >= total / 10:
+                os.kill(workers.pop(), signal.SIGKILL)
+
+        begin = time.perf_counter(), time.process_time()
+        results.append(identify.fit_many(start, records, file=folder / f"{name}.zarr", progress=told, **options))
+        took = time.perf_counter() - begin[0], time.process_time() - begin[1]
+        rows.append([name, *took, psutil.Process().memory_info().rss / 1e6, len(workers)])
+
+    measured("one process", [])
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as local, Client(local) as client:
+        pids: dict[str, int] = client.run(os.getpid)  # pyright: ignore[reportAssignmentType]
+        measured("two workers, one killed", list(pids.values())[:1], cluster=client)
+    assert np.array_equal(results[0].values, results[1].values), "other numbers"
+    return rows
+
+
 def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", nargs="?", choices=["blocks", "fits"], default="blocks")
+    parser.add_argument("--dampers", type=int, default=20_000)
+    asked = parser.parse_args()
+    if asked.what == "fits":
+        with tempfile.TemporaryDirectory() as name:
+            head = ["fitted by", "wall s", "processor s of the client", "resident size of the client MB", "not killed"]
+            report("cluster_fits", f"{asked.dampers} dampers", head, fits(asked.dampers, Path(name)))
+        return
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         table = ["computed by", "processor s a block", "wall s a block", "more processor time %"]

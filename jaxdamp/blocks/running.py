@@ -5,13 +5,14 @@ import itertools
 import os
 import pickle
 import platform
+import queue
 import re
 import threading
 import time
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from typing import NamedTuple, Protocol, final, runtime_checkable
 
 import jax
@@ -156,9 +157,11 @@ class _Workers:
         """The work as it travels, with every block: no copy is lost with its worker."""
         return self._job or _packed(self._work.part(indices))
 
-    def block(self, store: AbstractStore, number: int) -> "Future[int]":
-        """Compute and write a block; gives the number of its points."""
-        return self._executor.submit(_block, self.job(store.blocks.indices(number)), store, number)
+    def block(self, store: AbstractStore, number: int, tell: Callable[["Future[int]"], object]) -> "Future[int]":
+        """Compute and write a block, and tell when it has ended; gives the number of its points."""
+        future = self._executor.submit(_block, self.job(store.blocks.indices(number)), store, number)
+        future.add_done_callback(tell)
+        return future
 
 
 def _by_workers(
@@ -193,26 +196,36 @@ def _by_workers(
 
 
 def _in_turn(workers: _Workers, store: AbstractStore, left: list[int]) -> Iterator[tuple[int, Future[int]]]:
-    """The blocks as they end, few of them submitted at a time; whoever stops cancels the others."""
+    """The blocks as they end, few of them submitted at a time; whoever stops cancels the others.
+
+    Whatever the number of workers, a block costs the same: futures report themselves, and workers are counted now and
+    then.
+    """
     waiting, active = iter(left), {}
-    missing_since = np.inf  # when no worker was there for the first time, of this absence
+    ended: queue.SimpleQueue[Future[int]] = queue.SimpleQueue()
+    missing_since, looked, count = np.inf, -np.inf, 0  # start of an absence of all workers, last look, workers
     try:
         while True:
-            count = workers.count()
-            missing_since = np.inf if count else min(missing_since, time.monotonic())
+            now = time.monotonic()
+            if now - looked >= LOOK or not count:
+                looked, count = now, workers.count()
+                missing_since = np.inf if count else min(missing_since, now)
             room = max(WAITING * count - len(active), 0 if active else 1)
-            active |= {workers.block(store, number): number for number in itertools.islice(waiting, room)}
+            active |= {workers.block(store, number, ended.put): number for number in itertools.islice(waiting, room)}
             if not active:
                 return
-            done = wait(active, timeout=LOOK, return_when=FIRST_COMPLETED).done
-            if not done and time.monotonic() - missing_since > NO_WORKER:
-                blocks = ", ".join(map(str, sorted(active.values())))
-                raise RuntimeError(
-                    f"All workers of the cluster have ended, and none came in {NO_WORKER:g} s; blocks {blocks} were "
-                    f"asked for. What is done is in {store.path}, and the same call goes on from there."
-                )
-            for future in done:
-                yield active.pop(future), future
+            try:
+                done = ended.get(timeout=LOOK)
+            except queue.Empty:
+                if time.monotonic() - missing_since > NO_WORKER:
+                    blocks = ", ".join(map(str, sorted(active.values())))
+                    raise RuntimeError(
+                        f"All workers of the cluster have ended, and none came in {NO_WORKER:g} s; blocks {blocks} "
+                        f"were asked for. What is done is in {store.path}, and the same call goes on from there."
+                    ) from None
+            else:
+                yield active.pop(done), done
+                del done
     finally:
         for future in active:
             future.cancel()

@@ -258,7 +258,8 @@ class _Lost(_Gone):
     ("closed", "message"),
     [(True, "The client is closed, or its scheduler"), (False, r"Block \d was cancelled: .*s\.zarr")],
 )
-def test_a_client_that_ends_is_named_and_what_is_done_stays(tmp_path, closed, message):
+def test_a_client_that_ends_is_named_and_what_is_done_stays(tmp_path, monkeypatch, closed, message):
+    monkeypatch.setattr(running, "LOOK", 0.0)
     file, over = tmp_path / "s.zarr", points(at, COUNT)
     with pytest.raises(RuntimeError, match=message):
         jaxdamp.sweep(product, over, file=file, cluster=_Lost(closed))
