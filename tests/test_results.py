@@ -82,6 +82,7 @@ def _fits() -> list[AbstractResult]:
         identify.cross_validate({"linear": dampers.Linear}, runs),
         identify.fit_many(dampers.Linear, {"a": runs[:1], "b": runs[1:]}),
         by_setting(law=dampers.Linear, runs=runs, scheduled=True),
+        identify.control_charts({"force": np.random.default_rng(0).standard_normal(30)}, 25),
         identify.fit_targets(lambda n: {"y": n["x"] ** 2}, {"x": 1.0}, {"y": 4.0}),
     ]
 
@@ -94,6 +95,9 @@ def _vehicle_results() -> list[AbstractResult]:
         identify.fit_vehicle(car, record, over=["damper.rate"], dt=5e-3),
         identify.compare({"alone": car}, record, over=["damper.rate"], dt=5e-3),
         vehicles.modes(car),
+        jaxdamp.sweep(
+            lambda p: {"y": p["a"] ** 2}, {"a": [1.0, 2.0]}, summary=jaxdamp.sweeps.Summary(smallest={"y": 1})
+        ),
         jaxdamp.simulate(car, road, dt=5e-3),
         jaxdamp.simulation.harmonic_response(car, [1.0, 2.0], 0.01, substeps=4),
         rig.dynamic_stiffness(dampers.Linear(1500.0), [1.0, 2.0], [[0.01], [0.02]]),

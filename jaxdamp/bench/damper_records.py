@@ -7,7 +7,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, final
+from typing import final
 
 from jaxdamp import _checks
 from jaxdamp._files import FOLDER_SUFFIXES, natural_key
@@ -15,7 +15,7 @@ from jaxdamp.bench.manifest import NAME
 from jaxdamp.bench.read import read
 from jaxdamp.bench.readers import library
 from jaxdamp.bench.runs import BenchRun
-from jaxdamp.bench.sets import as_runs
+from jaxdamp.bench.sets import BenchSet, as_runs
 
 
 COLUMNS = ("damper", "file")  # of a table of files
@@ -45,8 +45,8 @@ class DamperRecords(Mapping[str, tuple[BenchRun, ...]]):
 
     def __init__(
         self,
-        read: Callable[[Any], BenchRun | Iterable[BenchRun]],
-        keys: Iterable[Any],
+        read: Callable[..., BenchRun | Iterable[BenchRun]],
+        keys: Iterable[object],
         names: Iterable[str] | None = None,
         stamps: Iterable[str] | None = None,
     ) -> None:
@@ -92,7 +92,7 @@ class DamperRecords(Mapping[str, tuple[BenchRun, ...]]):
         return DamperRecords(self._read, keys, names, stamps)
 
 
-def read_dampers(paths: str | os.PathLike[str], *, each: str, **options: Any) -> DamperRecords:
+def read_dampers(paths: str | os.PathLike[str], *, each: str, **options: object) -> DamperRecords:
     """The records of a production line: a folder tree or a table of files, of which each damper is read when needed.
 
     Hidden folders and files are left out. A `jaxdamp.toml` at the top says how all records are read, unless the folder
@@ -137,10 +137,11 @@ def read_dampers(paths: str | os.PathLike[str], *, each: str, **options: Any) ->
     return DamperRecords(functools.partial(_read_damper, options), keys, files, stamps)
 
 
-def _read_damper(options: Mapping[str, Any], key: tuple[list[Path], Path | None]) -> Iterable[BenchRun]:
+def _read_damper(options: Mapping[str, object], key: tuple[list[Path], Path | None]) -> Iterable[BenchRun]:
     """The records of the files of a damper, as their manifest says."""
     files, manifest = key
-    return read(files, **{"manifest": False if manifest is None else manifest, **options})
+    reading: Callable[..., BenchSet] = read
+    return reading(files, **{"manifest": False if manifest is None else manifest, **options})
 
 
 def _of_tree(top: Path, each: str) -> dict[str, list[Path]]:

@@ -262,7 +262,11 @@ class BlockStore(AbstractStore):
 
 
 def stored_blocks(path: Path) -> int:
-    """How many blocks a store has; none if there is none, or what is there cannot be read as one."""
+    """How many blocks a store has; none if there is none, or what is there cannot be read as one.
+
+    Arguments:
+        path: of the store.
+    """
     try:
         return int(_zarr().open_group(path, mode="r")[DONE].shape[0])
     except (OSError, KeyError, ValueError):

@@ -3,7 +3,6 @@
 import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -237,7 +236,7 @@ def _fitted(many: ManyFits) -> tuple[dict[str, np.ndarray], np.ndarray, dict[str
 
 
 def _given(
-    dampers: Any, names: Sequence[str] | None
+    dampers: object, names: Sequence[str] | None
 ) -> tuple[dict[str, np.ndarray], np.ndarray, dict[str, str], list[str]]:
     """Numbers of a user's own."""
     if not isinstance(dampers, Mapping) or not dampers:

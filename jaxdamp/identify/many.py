@@ -26,7 +26,7 @@ from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import Machine
 from jaxdamp.identify.many_blocks import fit_into_store
 from jaxdamp.identify.many_judging import judged, physical
-from jaxdamp.identify.many_records import begun_on, by_name, fitted_records, refuse_several_laws
+from jaxdamp.identify.many_records import Options, begun_on, by_name, fitted_records, refuse_several_laws
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.model import initial_state_for, rig_of
 from jaxdamp.identify.preparing import weights
@@ -160,7 +160,7 @@ def _side_by_side(
     loss: str,
     starts: int,
     max_steps: int,
-) -> dict[str, Any]:
+) -> Options:
     """What the searches of all dampers end with: fields of the result."""
     everyone = lanes.damper
     lanes, begin = _with_other_starts(lanes, records, starts)
@@ -182,8 +182,8 @@ def _side_by_side(
 
 
 def _one_by_one(
-    records: Sequence[tuple[BenchRun, ...]], law: AbstractDamper, free: FreeParameters, how: dict[str, Any]
-) -> dict[str, Any]:
+    records: Sequence[tuple[BenchRun, ...]], law: AbstractDamper, free: FreeParameters, how: Options
+) -> Options:
     """Each damper by a fit of its own, where records have numbers of their own: states at their beginning."""
     from jaxdamp.identify.fitting import fit  # which hands many dampers to this file
 

@@ -7,7 +7,7 @@ import re
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, final
+from typing import Any, final, overload
 
 import jax
 import numpy as np
@@ -17,7 +17,7 @@ from jaxdamp import _checks
 from jaxdamp._status import Status
 from jaxdamp.bench import BenchRun, DamperRecords
 from jaxdamp.blocks import AbstractWork, Blocks, BlockStore, Cluster, Variable, fill, stored_blocks
-from jaxdamp.identify.many_records import AllRecords, Beginning, begun_on, fitted_records, refuse_several_laws
+from jaxdamp.identify.many_records import AllRecords, Beginning, Options, begun_on, fitted_records, refuse_several_laws
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.starting import Start
 
@@ -40,9 +40,7 @@ class DamperFits(AbstractWork):
         names: of the dampers by row; rows without one stay empty.
     """
 
-    def __init__(
-        self, beginning: Beginning, options: Mapping[str, Any], records: AllRecords, names: Mapping[int, str]
-    ) -> None:
+    def __init__(self, beginning: Beginning, options: Options, records: AllRecords, names: Mapping[int, str]) -> None:
         self._beginning, self._options = beginning, options
         self._records, self._names = records, names
 
@@ -88,7 +86,7 @@ class DamperFits(AbstractWork):
         refuse_several_laws(name, runs, self._beginning.model, self._options)
         return runs
 
-    def _fitted(self, records: AllRecords) -> dict[str, dict[str, Any]]:
+    def _fitted(self, records: AllRecords) -> dict[str, dict[str, object]]:
         """What is stored of each damper; if the fit of all together raises, those of its halves, to leave one out."""
         from jaxdamp.identify.many import fit_many  # which hands its blocks to this file
 
@@ -110,9 +108,11 @@ class DamperFits(AbstractWork):
         return {name: _row(many, place) for place, name in enumerate(names)}
 
 
-def _row(many: ManyFits, place: int) -> dict[str, Any]:
+def _row(many: ManyFits, place: int) -> dict[str, object]:
     """What is stored of a damper."""
-    row = {name: getattr(many, name)[place] for name in ("values", "standard_errors", "fit_percent", "rmse", "steps")}
+    row: dict[str, object] = {
+        name: getattr(many, name)[place] for name in ("values", "standard_errors", "fit_percent", "rmse", "steps")
+    }
     row |= {name: array[place] for name in ("drift", "share_left_out") if (array := getattr(many, name)).size}
     errors = json.dumps(many.record_rmse[place].tolist() if many.record_rmse else [])
     return row | {"status": many.status[place].name.lower(), "record_rmse": errors}
@@ -127,7 +127,7 @@ def fit_into_store(
     progress: Callable[[int, int], None] | None,
     *,
     shared: bool,
-    options: Mapping[str, Any],
+    options: Options,
 ) -> ManyFits:
     """Fit the dampers that a store lacks, and give the fits of all dampers of the call.
 
@@ -141,44 +141,55 @@ def fit_into_store(
         shared: whether parameters are.
         options: of the call besides.
     """
+    place = _checked_path(path, len(records), settings, shared)
+    beginning = begun_on(law, _first_readable(records, options), options)
+    store, rows = _rows(place, _identity(beginning, options), records, len(beginning.free.names))
+    names = {row: name for row, name in enumerate(store.read("name")["name"]) if name}
+    fill(store, DamperFits(beginning, options, records, names), cluster, progress, "Fitting", "rows for dampers")
+    return ManyFits(
+        names=tuple(records),
+        records=RecordsInOrder(records),
+        settings=settings,
+        free=beginning.free,
+        options={**options, "bad_records": "keep"},
+        **_found(store, rows, tuple(records)),
+    )
+
+
+def _checked_path(
+    path: str | os.PathLike[str] | None, count: int, settings: tuple[float, ...] | None, shared: bool
+) -> Path:
+    """The path of a store; what does not go with one is refused."""
     if path is None or Path(path).suffix != ".zarr":
         remedy = "Write `file='name.zarr'`, in a folder that all workers reach."
         _checks.refuse("file", "end in '.zarr'", None if path is None else repr(str(path)), remedy)
     if shared:
         remedy = "Fit some dampers without `file` with it, then all with their law as the start and `freeze`."
         _checks.refuse("shared", "be left out with `file`: blocks do not know each other", "given", remedy)
-    if settings is not None and len(settings) != len(records):
-        _checks.refuse("settings", f"be one number for each of {len(records)} dampers", f"{len(settings)} numbers")
-    beginning = begun_on(law, _first_readable(records, options), options)
-    place, identity = Path(path).expanduser().absolute(), _identity(beginning, options)
-    store, rows = _rows(place, identity, records, len(beginning.free.names))
-    names = {row: name for row, name in enumerate(store.read("name")["name"]) if name}
-    fill(store, DamperFits(beginning, options, records, names), cluster, progress, "Fitting", "rows for dampers")
-    found = store.read("values", "standard_errors", *NUMBERS, "steps", "status", "record_rmse", "reason")
-    found = {name: values[rows] for name, values in found.items()}
-    status = tuple(Status[text.upper()] if text else Status.LEFT_OUT for text in found.pop("status"))
-    reasons = tuple(
-        str(reason) or "its block is not done yet" * (s is Status.LEFT_OUT)
-        for reason, s in zip(found["reason"], status, strict=True)
+    if settings is not None and len(settings) != count:
+        _checks.refuse("settings", f"be one number for each of {count} dampers", f"{len(settings)} numbers")
+    return Path(path).expanduser().absolute()
+
+
+def _found(store: BlockStore, rows: np.ndarray, names: tuple[str, ...]) -> dict[str, Any]:
+    """What a store holds of some dampers: fields of the result; those that were left out are named."""
+    found: dict[str, Any] = store.read(
+        "values", "standard_errors", *NUMBERS, "steps", "status", "record_rmse", "reason"
     )
-    errors = tuple(np.array(json.loads(text or "[]"), float) for text in found.pop("record_rmse"))
-    left = [name for name, reason in zip(records, found.pop("reason"), strict=True) if reason]
+    found = {name: values[rows] for name, values in found.items()}
+    status = tuple(Status[text.upper()] if text else Status.LEFT_OUT for text in found["status"])
+    reasons = [str(reason) for reason in found.pop("reason")]
+    left = [name for name, reason in zip(names, reasons, strict=True) if reason]
     if left:
         some = ", ".join(left[:5]) + ", …" * (len(left) > 5)
-        warnings.warn(
-            f"{len(left)} of {len(records)} dampers were left out: {some}. `many.remarks` says why.", stacklevel=5
-        )
-    return ManyFits(
-        names=tuple(records),
-        records=RecordsInOrder(records),
-        settings=settings,
-        free=beginning.free,
-        status=status,
-        reasons=reasons,
-        record_rmse=errors,
-        options={**options, "bad_records": "keep"},
-        **found,
-    )
+        words = f"{len(left)} of {len(names)} dampers were left out: {some}. `many.remarks` says why."
+        warnings.warn(words, stacklevel=6)
+    not_done = [
+        reason or "its block is not done yet" * (s is Status.LEFT_OUT)
+        for reason, s in zip(reasons, status, strict=True)
+    ]
+    errors = tuple(np.array(json.loads(text or "[]"), float) for text in found["record_rmse"])
+    return found | {"status": status, "reasons": tuple(not_done), "record_rmse": errors}
 
 
 @final
@@ -191,7 +202,11 @@ class RecordsInOrder(Sequence[tuple[BenchRun, ...]]):
     def __len__(self) -> int:
         return len(self._names)
 
-    def __getitem__(self, place: Any) -> Any:
+    @overload
+    def __getitem__(self, place: int) -> tuple[BenchRun, ...]: ...
+    @overload
+    def __getitem__(self, place: slice) -> "RecordsInOrder": ...
+    def __getitem__(self, place: int | slice) -> "tuple[BenchRun, ...] | RecordsInOrder":
         """The records of a damper, or of those of a slice."""
         if isinstance(place, slice):
             return RecordsInOrder(_part(self._records, self._names[place]))
@@ -251,7 +266,7 @@ def _part(records: AllRecords, names: Iterable[str]) -> AllRecords:
     return records.part(names) if isinstance(records, DamperRecords) else {name: records[name] for name in names}
 
 
-def _identity(beginning: Beginning, options: Mapping[str, Any]) -> dict[str, str]:
+def _identity(beginning: Beginning, options: Options) -> dict[str, str]:
     """What fits belong to: start and options, as texts."""
     leaves, structure = jax.tree.flatten(beginning.free.tree)
     digest = hashlib.sha256(re.sub(r" at 0x\w+", "", str(structure)).encode())
@@ -268,7 +283,7 @@ def _sentence(error: Exception) -> str:
     return text if isinstance(error, ValueError | OSError) and text else f"{type(error).__name__}: {text}"
 
 
-def _first_readable(records: AllRecords, options: Mapping[str, Any]) -> tuple[BenchRun, ...]:
+def _first_readable(records: AllRecords, options: Options) -> tuple[BenchRun, ...]:
     """The records of the first damper that can be read, from which a law class starts."""
     why = ""
     for name in records:

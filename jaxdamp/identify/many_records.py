@@ -17,6 +17,7 @@ from jaxdamp.rig import Rig
 
 
 CALL = 'fit_many(law, {"A": runs_of_a, "B": runs_of_b})'
+Options = Mapping[str, Any]  # of a call
 AllRecords = Mapping[str, tuple[BenchRun, ...]]
 
 
@@ -35,7 +36,7 @@ def by_name(dampers: object) -> AllRecords:
     return {name: as_runs(runs, f"dampers[{name!r}]") for name, runs in pairs}
 
 
-def fitted_records(name: str, runs: tuple[BenchRun, ...], options: Mapping[str, Any]) -> tuple[BenchRun, ...]:
+def fitted_records(name: str, runs: tuple[BenchRun, ...], options: Options) -> tuple[BenchRun, ...]:
     """The records of a damper that its fit takes.
 
     Arguments:
@@ -52,7 +53,7 @@ def fitted_records(name: str, runs: tuple[BenchRun, ...], options: Mapping[str, 
     return usable(runs, options["bad_records"], robust=options["loss"] != "squares", argument=argument)
 
 
-def refuse_several_laws(name: str, runs: tuple[BenchRun, ...], model: Model, options: Mapping[str, Any]) -> None:
+def refuse_several_laws(name: str, runs: tuple[BenchRun, ...], model: Model, options: Options) -> None:
     """Refuse records of one damper that no one law can follow, unless they are to be kept, or begin by themselves."""
     if options["bad_records"] != "keep" and options["initial_state"] != "estimated":
         refuse_contradicting(contradicting(model, runs), f"dampers[{name!r}]")
@@ -68,7 +69,7 @@ class Beginning(NamedTuple):
     free: FreeParameters
 
 
-def begun_on(law: Start, runs: Sequence[BenchRun], options: Mapping[str, Any], shared: Iterable[str] = ()) -> Beginning:
+def begun_on(law: Start, runs: Sequence[BenchRun], options: Options, shared: Iterable[str] = ()) -> Beginning:
     """The start that some records give.
 
     Arguments:

@@ -10,7 +10,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Contents, Table, plain, typeset_unit
-from jaxdamp._types import Dataset
+from jaxdamp._types import DataArray, Dataset
 from jaxdamp.blocks import AbstractStore, Blocks, BlockStore, Cluster, Variable, fill
 from jaxdamp.sweeps.axes import POINT, AbstractPoints
 from jaxdamp.sweeps.block_program import BlockProgram
@@ -101,7 +101,7 @@ class SweepSummary(AbstractResult):
     failed_points: int
     reasons: Mapping[str, int]
     statistics: Dataset
-    histograms: Mapping[str, Any]
+    histograms: "Mapping[str, DataArray]"
     smallest: Mapping[str, Dataset]
     largest: Mapping[str, Dataset]
     pareto: "Dataset | None"

@@ -124,16 +124,8 @@ def sweep(
     >>> float(data["product"].sel(a=2.0, b=5.0))
     10.0
     """
-    if not callable(function):
-        remedy = "The call is `sweep(function, over)`, such as `sweep(Ride(car, road), {'damper.rate': [1e3, 2e3]})`."
-        _checks.refuse("function", "be a function of a point", _checks.described(function), remedy)
-    if gradients not in (False, True, "forward", "reverse"):
-        _checks.refuse("gradients", "be False, True, 'forward' or 'reverse'", repr(gradients))
+    _check_call(function, gradients, file, by_block=cluster is not None or (file is not None and summary is not None))
     computation = Computation(function, as_points(over), gradients, chunk, devices)
-    if cluster is not None or (file is not None and summary is not None):
-        remedy = "Write `file='name.zarr'`, in a folder that all workers reach."
-        if file is None or Path(file).suffix != ".zarr":
-            _checks.refuse("file", "end in '.zarr', so that it can be written block by block", file, remedy)
     if summary is not None:
         return summarise(BlockProgram(computation), summary, None if file is None else str(file), cluster, progress)
     if file is not None and Path(file).suffix == ".zarr":
@@ -165,6 +157,18 @@ def sweep(
     table.warn()
     data = table.label()
     return data.assign_attrs(loop=loop) if computation.can_be_printed else data
+
+
+def _check_call(function: object, gradients: object, file: str | os.PathLike[str] | None, *, by_block: bool) -> None:
+    """Refuse what is no function, unknown derivatives, and a file that cannot be written block by block."""
+    if not callable(function):
+        remedy = "The call is `sweep(function, over)`, such as `sweep(Ride(car, road), {'damper.rate': [1e3, 2e3]})`."
+        _checks.refuse("function", "be a function of a point", _checks.described(function), remedy)
+    if gradients not in (False, True, "forward", "reverse"):
+        _checks.refuse("gradients", "be False, True, 'forward' or 'reverse'", repr(gradients))
+    if by_block and (file is None or Path(file).suffix != ".zarr"):
+        remedy = "Write `file='name.zarr'`, in a folder that all workers reach."
+        _checks.refuse("file", "end in '.zarr', so that it can be written block by block", file, remedy)
 
 
 @final

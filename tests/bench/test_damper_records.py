@@ -2,6 +2,7 @@
 
 import os
 import pickle
+from typing import Any
 
 import pytest
 
@@ -96,11 +97,12 @@ def test_what_is_no_line_is_refused(tree, tmp_path):
     ):
         with pytest.raises(error, match=message):
             read_dampers(paths, each=each)
-    for arguments, message in (
+    wrong: list[tuple[Any, str]] = [
         ((1, [1]), "`read` must be a function"),
         ((rate, [1, 2], ["a"]), "`names` must have one text for each of 2 dampers"),
         ((rate, [1, 2], ["a", "a"]), "be different and not empty, but is 2 times 'a'"),
         ((rate, [1], None, []), "`stamps` must have one text for each of 1 dampers"),
-    ):
+    ]
+    for arguments, message in wrong:
         with pytest.raises(ValueError, match=message):
             DamperRecords(*arguments)

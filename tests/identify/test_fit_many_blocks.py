@@ -2,6 +2,7 @@
 
 import pickle
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 import pytest
@@ -130,13 +131,14 @@ def test_a_damper_whose_fit_raises_is_left_out_alone(tmp_path, monkeypatch):
 def test_what_a_store_does_not_suit_is_refused(tmp_path):
     file, dampers = tmp_path / "line.zarr", DamperRecords(made, range(3))
     fit_many(START, dampers, file=file)
-    for law, options, message in (
+    cases: list[tuple[Bilinear, dict[str, Any], str]] = [
         (Bilinear(1600.0, 1500.0), {}, r"other work: start is Bilinear \(\w+\) there"),
         (START, {"loss": "soft_l1"}, "loss is squares there, soft_l1 now"),
         (START, {"rig": "gas"}, "parameters is rebound_rate, compression_rate there"),
         (START, {"shared": ["rebound_rate"]}, "`shared` must be left out with `file`"),
         (START, {"settings": [1.0]}, "one number for each of 3 dampers"),
-    ):
+    ]
+    for law, options, message in cases:
         with pytest.raises(ValueError, match=message):
             fit_many(law, dampers, file=file, **options)
     with pytest.raises(ValueError, match=r"`file` must end in '\.zarr'"):

@@ -81,7 +81,7 @@ def test_a_store_goes_on_and_whoever_computes_gives_the_same(tmp_path, whole):
     rest = swept(file=file)
     for found in (rest, swept(file=file)):
         assert found.to_dict() == here.to_dict() and found.statistics.identical(here.statistics)
-        assert found.pareto is not None and found.pareto.identical(here.pareto)
+        assert found.pareto is not None and here.pareto is not None and found.pareto.identical(here.pareto)
     chunk = file / "summary" / "c" / "2"
     chunk.write_bytes(chunk.read_bytes()[:-1])
     with pytest.warns(UserWarning, match="1 blocks .* damaged"):
