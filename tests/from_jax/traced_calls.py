@@ -34,6 +34,7 @@ NO_NUMBERS = {
     "": {"configure"},
     "bench": {
         "read",
+        "read_dampers",
         "read_kinematics",
         "read_limits",
         "read_rides",
@@ -177,6 +178,7 @@ SAMPLES: dict[str, dict[str, list[Call]]] = {
     },
     "identify": {
         "compare": [lambda f, x: f({"lag": law(x)}, [RUN]), lambda f, x: f({"lag": law(1.0)}, [run(x)])],
+        "control_charts": [lambda f, x: f({"force": [x * i for i in range(30)]}, 25)],
         "cross_validate": [lambda f, x: f({"lag": law(x)}, [RUN, RUN])],
         "default_ladder": [lambda f, x: f([run(x)])],
         "design_experiment": [
