@@ -195,7 +195,7 @@ def control_charts(
     >>> force[80:] += 8.0
     >>> found = control_charts({"force": force}, baseline=50)
     >>> found.since("force"), bool(found.signals["force"][2, 90:].all())
-    ('81', True)
+    ('80', True)
     """
     if isinstance(dampers, ManyFits):
         columns, errors, units = _fitted(dampers)

@@ -40,7 +40,7 @@ class Summary:
     >>> keep = sweeps.Summary(histograms={"y": [0.0, 1.0, 10.0]}, smallest={"y": 2})
     >>> found = jaxdamp.sweep(lambda p: {"y": (p["a"] - 5.0) ** 2}, points, summary=keep)
     >>> found.smallest["y"]["a"].values, found.histograms["y"].values
-    (array([5.   , 4.999]), array([   0, 1999, 4325, 3676]))
+    (array([5.   , 4.999]), array([   0, 1999, 4326, 3675]))
     """
 
     histograms: Mapping[str, Sequence[float] | np.ndarray] = dataclasses.field(default_factory=dict)
