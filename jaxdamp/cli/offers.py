@@ -46,6 +46,9 @@ NOT_OFFERED = {  # arguments of library functions, and why
         "gradients": "for programs",
         "progress": "shown at the terminal",
     },
+    "sweeps.summary.Summary": dict.fromkeys(
+        ("histograms", "smallest", "largest", "pareto"), "of sweeps by block, for programs; a command stores its points"
+    ),
     "export.to_explorer": {"records": "FILES"},
 }
 

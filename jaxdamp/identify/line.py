@@ -117,7 +117,7 @@ class ControlCharts(AbstractResult):
                 words = f"{name}: dampers made one after the other are alike (correlation {alike:.2f})"
                 said.append(f"{words}, so that the limits are too narrow and alarms more frequent.")
         missing = int(np.count_nonzero(~np.all(np.isfinite(self.values), axis=1)))
-        return (*said, *([f"{missing} dampers lack numbers, and are not charted there."] if missing else []))
+        return (*said, *([f"Dampers without some number, which are not charted there: {missing}."] if missing else []))
 
     def table(self) -> Table:
         """A row for each damper: its numbers, its signals, and what its fit remarks."""
