@@ -128,6 +128,19 @@ class Table:
         cells = tuple(tuple(row[i] for i in places) for row in chosen)
         return dataclasses.replace(self, columns=tuple(self.columns[i] for i in places), rows=cells)
 
+    def first(self, most: int) -> "Table":
+        """The first rows of a long table, which its title then says.
+
+        >>> print(Table("Points", (Column("x"),), ((1.0,), (2.0,), (3.0,))).first(2))
+        Points; the first 2 of 3 rows
+        x
+        1
+        2
+        """
+        if len(self.rows) <= most:
+            return self
+        return Table(f"{self.title}; the first {most} of {len(self.rows)} rows", self.columns, self.rows[:most])
+
     def records(self) -> list[dict[str, Cell]]:
         """The rows as dictionaries by the names of the columns: a list that `pandas.DataFrame` takes as it is."""
         return [dict(zip((c.name for c in self.columns), row, strict=True)) for row in self.rows]
