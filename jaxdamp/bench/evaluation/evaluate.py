@@ -33,7 +33,8 @@ def evaluate(
 
     Arguments:
         runs: one record or several.
-        velocities: at which forces are stated [m/s]; those of `OEM_VELOCITIES` that the records reach, if left out.
+        velocities: at which forces are stated [m/s]; those of `OEM_VELOCITIES` that the records reach, if left out, or
+            the largest that the records of all settings reach, if they reach none of these.
         method: "interpolation" between the peak forces of records; "window": of the records whose peak velocity is
             within `window` of the stated one; "loop": on the continuous loop of the fastest record. Interpolation
             where every setting has two records or more of different peak velocity, the loop elsewhere, if left out.
@@ -74,6 +75,8 @@ def evaluate(
         else:
             measurements += [replace(m, setting=name) for m in gas[name].measurements if np.isfinite(m.value)]
             notes += [f"{slowest.name}: {gas[name].note}"] if gas[name].note else []
+    missed, found = _not_reached(velocities, settings, cycles, measurements, method, window)
+    measurements, notes = measurements + found, missed + notes
     stated = tuple(sorted({m.velocity for m in measurements if m.velocity is not None}))
     return Evaluation(tuple(measurements), settings, cycles, gas, stated, method, tuple(notes))
 
@@ -191,6 +194,44 @@ def _at_velocities(
         measurements += [Measurement(f"{name} force", "N", *force, **more) for name, force in forces.items()]
         measurements.append(Measurement("rebound/compression ratio", "", *_ratio(*forces.values()), **more))
     return measurements
+
+
+def _not_reached(
+    velocities: Sequence[float] | None,
+    settings: Mapping[str, Sequence[BenchRun]],
+    cycles: Mapping[str, FoldedCycles],
+    measurements: Sequence[Measurement],
+    method: str,
+    window: float,
+) -> tuple[list[str], list[Measurement]]:
+    """Sentences on velocities at which no record gives a force; and forces at another one, where none was stated."""
+    reached = {m.velocity for m in measurements if m.velocity is not None and np.isfinite(m.value)}
+    missed = [] if velocities is None else [v for v in velocities if v not in reached]
+    if (velocities is None and reached) or not (missed or velocities is None):
+        return [], []
+    of_setting = {name: [m for m in measurements if m.record and m.setting == name] for name in settings}
+    peaks = {name: {direction: _peak_forces(runs, of_setting[name], direction) for direction in curve.DIRECTIONS}
+             for name, runs in settings.items()}  # fmt: skip
+    spans = [[point.velocity for point in points] for both in peaks.values() for points in both.values() if points]
+    if not spans:
+        return [], []
+    low, high = 0.0 if method == "loop" else max(map(min, spans)), min(map(max, spans))
+    where = f"the records give forces from {low:.3g} to {high:.3g} m/s" if low < high else (
+        "the peak velocities of the records enclose none"
+    )  # fmt: skip
+    if velocities is not None:
+        return [f"No force at {v:.4g} m/s: {where}." for v in missed], []
+    digits = 1 - int(np.floor(np.log10(high)))
+    velocity = max(float(np.floor(high * 10.0**digits) / 10.0**digits), low)
+    found = []
+    for name, runs in settings.items():
+        fastest = cycles[max(runs, key=lambda run: run.peak_velocity).name]
+        found += _at_velocities([velocity], peaks[name], fastest, name, method, window)
+    found = [m for m in found if np.isfinite(m.value)]
+    instead = f"Forces are stated at {velocity:.4g} m/s." if found else "Add records of other velocities."
+    return [
+        f"None of the usual velocities, from {curve.OEM_VELOCITIES[0]:g} m/s on, is reached: {where}. {instead}"
+    ], found
 
 
 def _ratio(
