@@ -73,6 +73,9 @@ class Shown(NamedTuple):
         return values if self.factor == 1.0 else values * self.factor
 
 
+_WORK = Shown("in lbf", 1.0 / (_SI["in"] * _SI["lbf"]))  # the area of a loop as a shop draws it
+
+
 @dataclass(frozen=True)
 class Display:
     """Units, sign and words of what is shown.
@@ -131,7 +134,9 @@ class Display:
             unit: in which the numbers are, such as "N s/m" or "mm".
             signed: whether their sign is that of the direction: forces, velocities and strokes.
         """
-        shown = _converted(unit, tuple(sorted(self._system.items())))
+        system = self._system
+        work = unit == "J" and (system.get("N"), system.get("m")) == ("lbf", "in")
+        shown = _WORK if work else _converted(unit, tuple(sorted(system.items())))
         return shown._replace(factor=-shown.factor) if signed and self.sign == COMPRESSION else shown
 
     def signed(self, quantity: str) -> bool:
@@ -223,8 +228,6 @@ def _converted(unit: str, system: tuple[tuple[str, str], ...]) -> Shown:
     wanted, factor = dict(system), 1.0
     if not wanted or not unit or _KEPT.search(unit):
         return Shown(unit, 1.0)
-    if unit == "J" and (wanted.get("N"), wanted.get("m")) == ("lbf", "in"):
-        return Shown("in lbf", 1.0 / (_SI["in"] * _SI["lbf"]))
     pieces: list[list[str]] = []
     for side, text in enumerate(unit.split("/")):
         words = []

@@ -8,6 +8,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError
+from jaxdamp._one_thread import one_thread
 from jaxdamp.bench.analysis import FoldedCycles, as_records, fold_cycles
 from jaxdamp.bench.contradictions import repeats
 from jaxdamp.bench.evaluation import curve
@@ -21,6 +22,7 @@ from jaxdamp.bench.settings import by_number, settings_apart
 WINDOW = 0.05  # share of a stated velocity within which samples, or records, count as taken at it
 
 
+@one_thread()
 def evaluate(
     runs: BenchRun | Iterable[BenchRun],
     *,
@@ -104,7 +106,7 @@ def _of_setting(
 ) -> list[Measurement]:
     """The figures of the records at one setting, its forces at the stated velocities, its rates and knees."""
     of_records = [m for run in runs for m in record_measurements(cycles[run.name], name, run.name)]
-    peaks = {direction: _peak_forces(runs, of_records, direction) for direction in curve.DIRECTIONS}
+    peaks = _peaks_of(name, runs, of_records)
     fastest = max(runs, key=lambda run: run.peak_velocity).name
     at_velocities = _at_velocities(velocities, peaks, cycles[fastest], name, method, window)
     return [*of_records, *at_velocities, *curve.rates_and_knees(cycles[fastest], name, fastest)]
@@ -206,32 +208,39 @@ def _not_reached(
 ) -> tuple[list[str], list[Measurement]]:
     """Sentences on velocities at which no record gives a force; and forces at another one, where none was stated."""
     reached = {m.velocity for m in measurements if m.velocity is not None and np.isfinite(m.value)}
-    missed = [] if velocities is None else [v for v in velocities if v not in reached]
-    if (velocities is None and reached) or not (missed or velocities is None):
+    missed = [v for v in velocities or () if v not in reached]
+    if not missed and (velocities is not None or reached):
         return [], []
-    of_setting = {name: [m for m in measurements if m.record and m.setting == name] for name in settings}
-    peaks = {name: {direction: _peak_forces(runs, of_setting[name], direction) for direction in curve.DIRECTIONS}
-             for name, runs in settings.items()}  # fmt: skip
-    spans = [[point.velocity for point in points] for both in peaks.values() for points in both.values() if points]
-    if not spans:
-        return [], []
-    low, high = 0.0 if method == "loop" else max(map(min, spans)), min(map(max, spans))
-    where = f"the records give forces from {low:.3g} to {high:.3g} m/s" if low < high else (
-        "the peak velocities of the records enclose none"
-    )  # fmt: skip
+    peaks = {name: _peaks_of(name, runs, measurements) for name, runs in settings.items()}
+    low, high = _span(peaks, method)
+    where = f"the records give forces from {low:.3g} to {high:.3g} m/s" if low < high else "the records enclose none"
     if velocities is not None:
         return [f"No force at {v:.4g} m/s: {where}." for v in missed], []
-    digits = 1 - int(np.floor(np.log10(high)))
-    velocity = max(float(np.floor(high * 10.0**digits) / 10.0**digits), low)
-    found = []
-    for name, runs in settings.items():
-        fastest = cycles[max(runs, key=lambda run: run.peak_velocity).name]
-        found += _at_velocities([velocity], peaks[name], fastest, name, method, window)
-    found = [m for m in found if np.isfinite(m.value)]
-    instead = f"Forces are stated at {velocity:.4g} m/s." if found else "Add records of other velocities."
-    return [
-        f"None of the usual velocities, from {curve.OEM_VELOCITIES[0]:g} m/s on, is reached: {where}. {instead}"
-    ], found
+    found, instead = list[Measurement](), "Add records of other velocities."
+    if low < high:
+        digits = 1 - int(np.floor(np.log10(high)))
+        velocity = max(float(np.floor(high * 10.0**digits) / 10.0**digits), low)
+        instead = f"Forces are stated at {velocity:.4g} m/s."
+        for name, runs in settings.items():
+            fastest = cycles[max(runs, key=lambda run: run.peak_velocity).name]
+            found += _at_velocities([velocity], peaks[name], fastest, name, method, window)
+    usual = f"None of the usual velocities, from {curve.OEM_VELOCITIES[0]:g} m/s on, is reached"
+    return [f"{usual}: {where}. {instead}"], found
+
+
+def _peaks_of(
+    setting: str, runs: Sequence[BenchRun], measurements: Sequence[Measurement]
+) -> dict[str, list[curve.PeakForce]]:
+    """Forces at the peak velocities of the records of a setting, by direction."""
+    of_records = [m for m in measurements if m.record and m.setting == setting]
+    return {direction: _peak_forces(runs, of_records, direction) for direction in curve.DIRECTIONS}
+
+
+def _span(peaks: Mapping[str, Mapping[str, Sequence[curve.PeakForce]]], method: str) -> tuple[float, float]:
+    """The lowest and the highest velocity at which the records of all settings give a force; equal if at none."""
+    spans = [[point.velocity for point in points] for both in peaks.values() for points in both.values() if points]
+    low, high = max(map(min, spans), default=0.0), min(map(max, spans), default=0.0)
+    return (0.0, high) if method == "loop" else (low, max(low, high))
 
 
 def _ratio(
