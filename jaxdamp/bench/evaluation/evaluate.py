@@ -212,8 +212,7 @@ def _not_reached(
     if not missed and (velocities is not None or reached):
         return [], []
     peaks = {name: _peaks_of(name, runs, measurements) for name, runs in settings.items()}
-    low, high = _span(peaks, method)
-    where = f"the records give forces from {low:.3g} to {high:.3g} m/s" if low < high else "the records enclose none"
+    low, high, where = _span(peaks, method)
     if velocities is not None:
         return [f"No force at {v:.4g} m/s: {where}." for v in missed], []
     found, instead = list[Measurement](), "Add records of other velocities."
@@ -236,11 +235,13 @@ def _peaks_of(
     return {direction: _peak_forces(runs, of_records, direction) for direction in curve.DIRECTIONS}
 
 
-def _span(peaks: Mapping[str, Mapping[str, Sequence[curve.PeakForce]]], method: str) -> tuple[float, float]:
-    """The lowest and the highest velocity at which the records of all settings give a force; equal if at none."""
+def _span(peaks: Mapping[str, Mapping[str, Sequence[curve.PeakForce]]], method: str) -> tuple[float, float, str]:
+    """The lowest and highest velocity at which the records of all settings give a force, equal if at none; in words."""
     spans = [[point.velocity for point in points] for both in peaks.values() for points in both.values() if points]
     low, high = max(map(min, spans), default=0.0), min(map(max, spans), default=0.0)
-    return (0.0, high) if method == "loop" else (low, max(low, high))
+    low = 0.0 if method == "loop" else low
+    words = f"the records give forces from {low:.3g} to {high:.3g} m/s" if low < high else "the records enclose none"
+    return low, max(low, high), words
 
 
 def _ratio(
