@@ -41,8 +41,10 @@ UNITS = {
 _FACTOR = re.compile(r"(lbf|kgf|kN|N|mm|in|m|kg|lb|s)(?:\^(-?[\d.]+))?")
 _KEPT = re.compile(r"m/s(\^|²|\^2)|^m\^?[23²³]|m/km|cycle")  # accelerations, areas, road roughness: SI for everybody
 _EXPONENT = re.compile(r"(?<![\w.])\d(?:\.\d+)?e\+0[1-5]\b")  # two or three digits of a large number: 1.1e+03 is 1100
+_NUMBER = r"[-−+]?(?:\d+(?:\.\d+)?(?:e[-+]?\d+)?|inf)"
 _AMOUNT = re.compile(
-    r"(?<![\w.])([-−+]?\d+(?:\.\d+)?)(?:( to | … )([-−+]?\d+(?:\.\d+)?))? (N s/m|N/mm|N/m|mm/s|m/s|mm|kN|N)(?![\w²^/])"
+    rf"(?<![\w.])({_NUMBER})(?:( to | … | ± )({_NUMBER}))? "
+    r"(N s/m|N/mm|N/m|mm/s|m/s|mm|kN|kg|N|m|J)(?![\w²³^/·]| [ms]\b)"
 )
 _SIGNED = re.compile(
     r"(mid-stroke |stated )?(rebound |compression |mean |static |gas |least |largest )?(force|velocity|stroke)( at .*)?"
@@ -69,6 +71,9 @@ class Shown(NamedTuple):
     def __call__(self, values: Number) -> Number:
         """The numbers that are printed."""
         return values if self.factor == 1.0 else values * self.factor
+
+
+_WORK = Shown("in lbf", 1.0 / (_SI["in"] * _SI["lbf"]))  # the area of a loop as a shop draws it
 
 
 @dataclass(frozen=True)
@@ -129,7 +134,9 @@ class Display:
             unit: in which the numbers are, such as "N s/m" or "mm".
             signed: whether their sign is that of the direction: forces, velocities and strokes.
         """
-        shown = _converted(unit, tuple(sorted(self._system.items())))
+        system = self._system
+        work = unit == "J" and (system.get("N"), system.get("m")) == ("lbf", "in")
+        shown = _WORK if work else _converted(unit, tuple(sorted(system.items())))
         return shown._replace(factor=-shown.factor) if signed and self.sign == COMPRESSION else shown
 
     def signed(self, quantity: str) -> bool:
@@ -145,6 +152,10 @@ class Display:
                 order[first], order[second] = second, first
         return order
 
+    def speed(self, value: float) -> str:
+        """The speed of a vehicle [m/s] in words: in miles an hour where lengths are in inches."""
+        return f"{value / 0.44704:.3g} mph" if self._system.get("m") == "in" else f"{value:.4g} m/s"
+
     def text(self, label: str) -> str:
         """The label of an axis or a table, with the unit in brackets and the words on the sign that are shown."""
         return self._turned(re.sub(r"\[([^\[\]]+)\]", lambda found: f"[{self.of(found[1]).unit}]", label))
@@ -158,13 +169,16 @@ class Display:
         return _SIGN_WORDS.sub(lambda found: _PHRASES[found[0]], text) if self.sign == COMPRESSION else text
 
     def _amount(self, found: re.Match[str]) -> str:
+        """Numbers with their unit as they are shown; a value beside its error has the digits that the error leaves."""
         shown = self.of(found[4])
-        numbers = [
-            _plain(f"{shown(float(text.replace('−', '-'))):.{_figures(text)}g}")
-            for text in (found[1], found[3])
-            if text
-        ]
-        return f"{(found[2] or '').join(numbers)} {shown.unit}"
+        texts = [text.replace("−", "-") for text in (found[1], found[3]) if text]
+        values = [shown(float(text)) for text in texts]
+        if found[2] == " ± ":
+            said = _plain(plus_minus(*values))
+        else:
+            pairs = zip(values, texts, strict=True)
+            said = (found[2] or "").join(_plain(f"{value:.{_figures(text)}g}") for value, text in pairs)
+        return f"{said} {shown.unit}"
 
 
 def _plain(text: str) -> str:
@@ -174,7 +188,38 @@ def _plain(text: str) -> str:
 
 def _figures(text: str) -> int:
     """Significant figures of a number as it is written, three at the least."""
-    return max(3, len(re.sub(r"^[-−+]?0*\.?0*|\.", "", text)))
+    return max(3, len(re.sub(r"^[-−+]?0*\.?0*|\.|e.*", "", text)))
+
+
+def rounded(value: float, error: float) -> tuple[str, str]:
+    """A value and its standard error as text, with the significant digits.
+
+    The error has two digits, the value the digits down to the second digit of the error, but at least one.
+
+    Arguments:
+        value: the number.
+        error: its standard error, in the same unit.
+
+    >>> rounded(14361.27, 61.8), rounded(0.9035, 0.2912), rounded(3.2, float("inf"))
+    (('14361', '62'), ('0.90', '0.29'), ('3.2', 'inf'))
+    """
+    if not (np.isfinite(error) and np.isfinite(value) and error > 0):
+        return f"{value:.5g}", f"{error:.2g}"
+    place = int(np.floor(np.log10(error))) - 1
+    place_of_value = min(place, int(np.floor(np.log10(abs(value))))) if value else place
+    if max(abs(value), error) >= 1e9 or place_of_value < -9:
+        return f"{value:.3e}", f"{error:.1e}"
+    texts = (f"{round(number, -at):.{max(-at, 0)}f}" for number, at in ((value, place_of_value), (error, place)))
+    return next(texts), next(texts)
+
+
+def plus_minus(value: float, error: float) -> str:
+    """A value with its error, each with the digits that mean something.
+
+    >>> plus_minus(827.3, 551.0), plus_minus(0.131, 0.00042)
+    ('830 ± 550', '0.13100 ± 0.00042')
+    """
+    return " ± ".join(rounded(value, error))
 
 
 @lru_cache(maxsize=256)

@@ -1,6 +1,6 @@
-"""One thread for NumPy's linear algebra while a fit runs.
+"""One thread for NumPy's linear algebra while a fit runs, or records are looked over.
 
-The matrices of a fit are small. Several threads win nothing on them, and on a busy machine they wait for one another a
+The matrices are small or narrow. Several threads win nothing on them, and on a busy machine they wait for one another a
 hundred times longer than the work takes.
 """
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from jaxdamp import _checks
-from jaxdamp._display import Display, display
+from jaxdamp._display import Display, display, plus_minus
 from jaxdamp._words import path_words, said, typeset
 
 
@@ -127,6 +127,19 @@ class Table:
         chosen = (row for row in self.rows if rows is None or row[0] in rows)
         cells = tuple(tuple(row[i] for i in places) for row in chosen)
         return dataclasses.replace(self, columns=tuple(self.columns[i] for i in places), rows=cells)
+
+    def first(self, most: int) -> "Table":
+        """The first rows of a long table, which its title then says.
+
+        >>> print(Table("Points", (Column("x"),), ((1.0,), (2.0,), (3.0,))).first(2))
+        Points; the first 2 of 3 rows
+        x
+        1
+        2
+        """
+        if len(self.rows) <= most:
+            return self
+        return Table(f"{self.title}; the first {most} of {len(self.rows)} rows", self.columns, self.rows[:most])
 
     def records(self) -> list[dict[str, Cell]]:
         """The rows as dictionaries by the names of the columns: a list that `pandas.DataFrame` takes as it is."""
@@ -303,34 +316,3 @@ def _plain_cell(cell: object) -> object:
         return "" if cell is None else cell
     said = display().words(cell)
     return f"'{said}" if said.startswith(("=", "+", "-", "@", "\t", "\r")) else said
-
-
-def rounded(value: float, error: float) -> tuple[str, str]:
-    """A value and its standard error as text, with the significant digits.
-
-    The error has two digits, the value the digits down to the second digit of the error, but at least one.
-
-    Arguments:
-        value: the number.
-        error: its standard error, in the same unit.
-
-    >>> rounded(14361.27, 61.8), rounded(0.9035, 0.2912), rounded(3.2, float("inf"))
-    (('14361', '62'), ('0.90', '0.29'), ('3.2', 'inf'))
-    """
-    if not (np.isfinite(error) and np.isfinite(value) and error > 0):
-        return f"{value:.5g}", f"{error:.2g}"
-    place = int(np.floor(np.log10(error))) - 1
-    place_of_value = min(place, int(np.floor(np.log10(abs(value))))) if value else place
-    if max(abs(value), error) >= 1e9 or place_of_value < -9:
-        return f"{value:.3e}", f"{error:.1e}"
-    texts = (f"{round(number, -at):.{max(-at, 0)}f}" for number, at in ((value, place_of_value), (error, place)))
-    return next(texts), next(texts)
-
-
-def plus_minus(value: float, error: float) -> str:
-    """A value with its error, each with the digits that mean something.
-
-    >>> plus_minus(827.3, 551.0), plus_minus(0.131, 0.00042)
-    ('830 ± 550', '0.13100 ± 0.00042')
-    """
-    return " ± ".join(rounded(value, error))

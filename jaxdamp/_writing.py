@@ -1,7 +1,7 @@
 """Writing of files, completely or not at all, and until they are on the disk."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -39,3 +39,30 @@ def sync(path: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
+
+
+def own_place(root: Path, name: str, aside: Callable[[Path], None], *, replace: bool = False) -> Path:
+    """The place of a file below a folder, free to be written: nothing is written through a link, or lost.
+
+    Arguments:
+        root: the folder.
+        name: of the file, from there.
+        aside: moves away what is in the way: a link, a file in the place of a folder, what has the name already.
+        replace: a file of this name may be replaced.
+    """
+    place = root / name
+    for part in (root / above for above in reversed(Path(name).parents[:-1])):
+        if part.is_symlink() or part.is_file():
+            aside(part)
+    if place.is_symlink() or (place.exists() and not replace):
+        aside(place)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    return place
+
+
+def renamed(path: Path) -> None:
+    """Give a file or a link a free name, by tildes at its end."""
+    free = path.with_name(f"{path.name}~")
+    while os.path.lexists(free):
+        free = free.with_name(f"{free.name}~")
+    os.replace(path, free)

@@ -10,6 +10,7 @@ import jax
 
 from jaxdamp import _checks
 from jaxdamp._files import cache_home
+from jaxdamp._forked import started
 from jaxdamp.codegen import is_printing
 
 
@@ -75,7 +76,7 @@ def configure(
     devices = usable if cpu_devices is None else cpu_devices
     if devices < 1:
         _checks.refuse("cpu_devices", "be one or more", devices)
-    if _started():
+    if started():
         _refuse_change(devices, fused_loops)
     else:
         jax.config.update("jax_num_cpu_devices", devices)
@@ -140,17 +141,6 @@ def _fuses_loops() -> bool:
 def _devices() -> int:
     """The number of CPU devices that JAX has or will have; −1 if nobody has said one."""
     return jax.config.jax_num_cpu_devices  # pyright: ignore[reportAttributeAccessIssue]
-
-
-def _started() -> bool:
-    """Whether JAX has started its backend, after which it refuses another number of devices."""
-    now = _devices()
-    try:
-        jax.config.update("jax_num_cpu_devices", now + 1)
-    except RuntimeError:
-        return True
-    jax.config.update("jax_num_cpu_devices", now)
-    return False
 
 
 def _refuse_change(devices: int, fused_loops: bool) -> None:

@@ -19,6 +19,7 @@ SHOP = Display("imperial", "compression-positive")
         ("N s/m", "lbf s/in", 0.0254 / 4.4482216152605),
         ("kN", "lbf", 1e3 / 4.4482216152605),
         ("N s^0.5/m^0.5", "lbf s^0.5/in^0.5", 0.0254**0.5 / 4.4482216152605),
+        ("J", "in lbf", 1 / (0.0254 * 4.4482216152605)),
         ("m/s^2", "m/s^2", 1.0),
         ("m^3", "m^3", 1.0),
         ("Hz", "Hz", 1.0),
@@ -63,6 +64,26 @@ def test_large_numbers_in_sentences_are_written_out():
     assert Display("imperial").words(said) == "like a spring of 6.281 lbf/in, a jump of 449.6 lbf"
     assert Display("imperial").words("rear -4.45 kN of 2.67 kN") == "rear -1000 lbf of 600 lbf"
     assert Display().words("between 1e-05 and 2.5e+07") == "between 1e-05 and 2.5e+07"
+
+
+@pytest.mark.parametrize(
+    ("said", "shown"),
+    [
+        ("751.8 ± 3.3 N in rebound", "169.01 ± 0.74 lbf in rebound"),
+        ("(1e+08 ± 5.7e+08 N/m)", "(600000 ± 3300000 lbf/in)"),
+        ("known to 254 ± inf mm", "known to 10 ± inf in"),
+        ("stroke noise 1e-05 m", "stroke noise 0.000394 in"),
+        ("2.54 m, 4.54 kg and 11.3 J per cycle", "100 in, 10 lb and 100 in lbf per cycle"),
+        ("3e16 ± 1e19 N/m³, 3 kg m^2, 3 N m, 2 N/s, 5 W", "3e16 ± 1e19 N/m³, 3 kg m^2, 3 N m, 2 N/s, 5 W"),
+    ],
+)
+def test_all_numbers_of_a_unit_in_a_sentence_are_converted(said, shown):
+    """A value keeps no other unit than its error."""
+    assert Display("imperial").words(said) == shown and Display().words(said) == said
+
+
+def test_the_speed_of_a_vehicle_is_no_velocity_of_a_damper():
+    assert Display("metric").speed(20.0) == "20 m/s" and Display("imperial").speed(20.0) == "44.7 mph"
 
 
 def test_a_picture_has_ticks_in_the_unit_and_runs_the_other_way():

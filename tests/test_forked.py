@@ -52,3 +52,22 @@ os.waitpid(child, 0)
 """
     done = subprocess.run([sys.executable, "-W", "ignore", "-c", program], capture_output=True, text=True, timeout=600)
     assert float(done.stdout) == pytest.approx(150.0, rel=1e-3), done.stderr
+
+
+def test_a_fork_after_a_computation_with_jax_alone_is_refused():
+    program = """
+import os
+import jax.numpy as jnp
+from jaxdamp.dampers import Linear
+from jaxdamp.rig import respond
+(2.0 * jnp.ones(3)).block_until_ready()
+if not os.fork():
+    try:
+        respond(Linear(1500.0), [0.0, 0.1, 0.2], [0.0, 0.01, 0.02])
+    except RuntimeError as error:
+        print(str(error)[:24], flush=True)
+    os._exit(0)
+os.wait()
+"""
+    done = subprocess.run([sys.executable, "-W", "ignore", "-c", program], capture_output=True, text=True, timeout=60)
+    assert done.stdout.strip() == "This process was forked", done.stderr

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
+from jaxdamp import bench
 from jaxdamp._one_thread import one_thread
+from jaxdamp.bench import velocity
 
 
 def threads() -> set[int]:
@@ -33,3 +35,12 @@ def test_it_is_lifted_after_an_error() -> None:
     with pytest.raises(RuntimeError), one_thread():
         raise RuntimeError
     assert threads() == {2}
+
+
+def test_velocities_of_records_are_found_in_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = list[set[int]]()
+    plain = velocity._least_squares
+    monkeypatch.setattr(velocity, "_least_squares", lambda *given: seen.append(threads()) or plain(*given))
+    time = np.linspace(0.0, 4.0, 401)
+    bench.estimate_velocity(time, np.sin(6.0 * time))
+    assert seen and set.union(*seen) == {1} and threads() == {2}

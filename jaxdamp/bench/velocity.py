@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks
+from jaxdamp._one_thread import one_thread
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import clock
 from jaxdamp.bench.motion import Samples, cycle_instants, dominant_frequency
@@ -31,6 +32,7 @@ _QUIET = 0.03  # residual, relative to the amplitude, that is taken for ripple a
 
 
 @of_known_numbers
+@one_thread()
 def estimate_velocity(time: ArrayLike, stroke: ArrayLike, *, method: str | None = None) -> tuple[Samples, str]:
     """Velocity of a uniformly sampled stroke, and a sentence that says how it was found.
 

@@ -53,7 +53,8 @@ def bench_command(
         check = None if chosen is None else evaluation.check(chosen)
         tables = evaluation.tables()
         screen.answer(*bench_verdict(evaluation, limits=check))
-        screen.table(tables["velocities"])
+        if tables["velocities"].rows:
+            screen.table(tables["velocities"])
         screen.details(*(tables[name] for name in ("settings", "peak_forces", "loops")))
         screen.remarks(evaluation.notes, style="yellow")
         if check is not None:

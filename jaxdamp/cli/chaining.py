@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from jaxdamp import _checks, simulate
+from jaxdamp._display import display
 from jaxdamp.bench import BenchSet
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.fitting import fit_laws, show, write_fits
@@ -91,7 +92,7 @@ def report(
             if result is not None:
                 write_tuning(draft, result)
             write_tables(draft, {f"ride_{name}": table for name, table in tables.items()})
-        title = f"{vehicle} on {road} at {driving.speed:g} m/s"
+        title = f"{vehicle} on {road} at {display().speed(driving.speed)}"
         words = {"title": f"Bench records to a better damper: {title}", "remarks": remarks, "runs": tuple(runs)}
         work.page(chain_report, fits.comparison, {title: rides}, result, preflight=preflight, **words)
     exit_code_of(result)

@@ -25,6 +25,7 @@ from jaxdamp.report import (
     parameters_of,
     records_table,
 )
+from jaxdamp.rig import Rig
 
 
 _BRIEF = ("law", "free", "fit", "held-out fit", "held-out RMSE", "note")  # columns of the ladder at the terminal
@@ -222,7 +223,9 @@ def fit_laws(
     with screen.stage(title, total=len(names)) as advance:
         try:
             starts = identify.default_ladder(tuple(runs), names, rig=rig)
-            options["bounds"] = bounds_in_si(options.get("bounds") or {}, [{"law": law} for law in starts.values()])
+            options["bounds"] = bounds_in_si(
+                options.get("bounds") or {}, [{"law": law, "rig": Rig()} for law in starts.values()]
+            )
             for outcome in identify.fit_each(
                 starts,
                 tuple(runs),

@@ -16,7 +16,7 @@ from typing import Any
 import typer
 from filelock import FileLock, Timeout
 
-from jaxdamp._writing import sync, write_whole
+from jaxdamp._writing import own_place, renamed, sync, write_whole
 from jaxdamp.cli import interrupt, resuming
 from jaxdamp.cli.interrupt import Interrupted
 
@@ -38,10 +38,10 @@ class Results:
         missing: what was still to come at the last `publish`, in words.
     """
 
-    def __init__(self, target: Path, command: str, earlier: list[str], *, begun: bool = False) -> None:
+    def __init__(self, target: Path, command: str, earlier: list[str], begun: dict[str, str] | None = None) -> None:
         self.target, self._command, self._earlier = target, command, earlier
-        self._published: dict[str, str] = {}  # hashes by file
-        self._begun = begun  # what is in the folder is of this very run
+        self._published = begun or {}  # hashes by file
+        self._begun = begun is not None  # what is in the folder is of this very run
         self.missing = "everything"
         self.draft = self._new_draft()
 
@@ -68,6 +68,7 @@ class Results:
             fresh = written(self.draft)
             for name in fresh:
                 sync(self.draft / name)
+            own = set(self._published)
             self._published |= {name: _sha256(self.draft / name) for name in fresh}
             if not self.target.exists():
                 self._tell(self.draft, missing)
@@ -76,29 +77,28 @@ class Results:
                 self.draft.chmod(0o777 & ~mask)
                 self.draft.rename(self.target)
             else:
-                self._move(fresh, missing)
+                self._move(fresh, own, missing)
             sync(self.target.parent)
             self._begun = True
             shutil.rmtree(self.draft, ignore_errors=True)
             if missing:
                 self.draft = self._new_draft()
 
-    def _move(self, fresh: list[str], missing: str) -> None:
-        """Move the draft into a folder that exists."""
+    def _move(self, fresh: list[str], own: set[str], missing: str) -> None:
+        """Move the draft into a folder that exists; the files of this run there are replaced, others and links kept."""
         if not self._begun:
             self._keep_previous(fresh)
         self._tell(self.target, missing or "what was being moved here when the run ended")
         for name in fresh:
-            place = self.target / name
-            place.parent.mkdir(parents=True, exist_ok=True)
-            os.replace(self.draft / name, place)
+            os.replace(self.draft / name, own_place(self.target, name, self._keep, replace=name in own))
         self._tell(self.target, missing)
         if not missing:
             (self.target / UNFINISHED).unlink(missing_ok=True)
 
     def _keep_previous(self, fresh: list[str]) -> None:
         """Move what an earlier run wrote, and files of the names to come, to `.previous`; the one before is dropped."""
-        there = [name for name in dict.fromkeys([*self._earlier, *fresh]) if (self.target / name).is_file()]
+        named = dict.fromkeys([*self._earlier, *fresh])
+        there = [name for name in named if (self.target / name).is_file() and _inside(self.target, name)]
         if not there:
             return
         previous, old = self.target / PREVIOUS, self.target / MANIFEST
@@ -108,9 +108,13 @@ class Results:
             shutil.copyfile(old, previous / MANIFEST)
         self._tell(self.target, f"everything; the results of the run before are in {PREVIOUS}", [*there])
         for name in there:
-            (previous / name).parent.mkdir(parents=True, exist_ok=True)
-            os.replace(self.target / name, previous / name)
+            self._keep(self.target / name)
             _remove_empty((self.target / name).parent, self.target)
+
+    def _keep(self, place: Path) -> None:
+        """Move a file of the folder, or a link, to `.previous`."""
+        name = place.relative_to(self.target).as_posix()
+        os.replace(place, own_place(self.target / PREVIOUS, name, renamed))
 
     def _tell(self, folder: Path, missing: str, besides: list[str] | None = None) -> None:
         """Write the manifest, and first the note on what is missing."""
@@ -235,7 +239,7 @@ def _opened(target: Path, command: str, replace: bool, resumed: bool) -> Results
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.exists() and not os.access(target, os.W_OK | os.X_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-        return Results(target, command, earlier, begun=resumed)
+        return Results(target, command, earlier, _manifest(target)["sha256"] if resumed else None)
     except OSError as error:
         raise _unwritable(target, error) from error
 
@@ -280,6 +284,8 @@ def _earlier_files(target: Path, command: str, replace: bool) -> list[str]:
             f"The folder {str(target)!r} holds the results of jaxdamp {by}, which jaxdamp {command} does not replace: "
             "name another one with --out."
         )
+    if replace and (target / PREVIOUS).is_symlink():
+        raise ValueError(f"{str(target / PREVIOUS)!r} is a link, and earlier results are kept there: remove the link.")
     if replace:
         return _unchanged(target, manifest)
     if manifest:
@@ -307,13 +313,19 @@ def _unchanged(folder: Path, manifest: Mapping[str, Any]) -> list[str]:
     hashes = manifest.get("sha256", {})
     files = []
     for name in manifest.get("files", []):
-        path = folder / str(name)
-        inside = path.resolve().is_relative_to(folder.resolve()) and not path.is_symlink()
-        if name == MANIFEST or not inside or not path.is_file():
+        name = str(name)
+        path = folder / name
+        if name == MANIFEST or not _inside(folder, name) or not path.is_file():
             continue
         if name == UNFINISHED or not manifest.get("complete") or hashes.get(name) == _sha256(path):
             files.append(name)
     return files
+
+
+def _inside(folder: Path, name: str) -> bool:
+    """Whether a file is inside the folder, wherever links lead, and no link itself."""
+    path = folder / name
+    return path.resolve().is_relative_to(folder.resolve()) and not path.is_symlink()
 
 
 def _forget(previous: Path) -> None:

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from jaxdamp import _checks, export, plots, roads, simulate
+from jaxdamp._display import display
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.controlling import Controlling
 from jaxdamp.cli.early import refuse_road
@@ -178,7 +179,7 @@ def ride(
         axles = axles_sentence(responses)
         if axles:
             screen.say(axles)
-        title = f"{vehicle} on {road} at {driving.speed:g} m/s"
+        title = f"{vehicle} on {road} at {display().speed(driving.speed)}"
         with work.saving("Tables and channels") as draft:
             _write(draft, laws, responses)
             write_tables(draft, tables)

@@ -48,7 +48,10 @@ def _files(asked: Any) -> list[Path]:
 
 def _stated(file: Path) -> dict[str, str]:
     """Units and sign in a file."""
-    table = read_toml(file).get(TABLE, {})
+    document = read_toml(file)
+    table = document.get(TABLE, {})
+    if isinstance(document.get("units"), str):  # as a table they are those of the records in its folder
+        _checks.refuse("units", f"stand under [{TABLE}]", f"{document['units']!r} above all tables in {file}")
     wrong = [key for key in table if key not in KEYS or not isinstance(table[key], str)] if table else []
     if not isinstance(table, dict) or wrong:
         _checks.refuse(TABLE, f"hold {' and '.join(KEYS)} as text", f"{table!r} in {file}", 'Such as units = "SI".')

@@ -2,7 +2,7 @@
 
 import json
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -22,7 +22,7 @@ from jaxdamp.cli.riding import Driving, beyond_vehicles, headline, unusual
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, read_module, with_law, write_laws
 from jaxdamp.control import Controlled
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.report import sweep_report, tuning_report
+from jaxdamp.report import MOST_POINTS, Table, best_points, sweep_report, tuning_report
 from jaxdamp.roads import WhiteRoad
 from jaxdamp.simulation import stationary_notes
 from jaxdamp.sweeps import without_effect
@@ -30,6 +30,7 @@ from jaxdamp.tune import Status, TuneResult, limit_spans
 from jaxdamp.vehicles import AbstractVehicle
 
 
+ON_SCREEN = 30  # points of a sweep that are printed; of more, its smallest results are printed too
 GRIP = "+10%"  # how much more a tyre load may vary after a tuning, by default
 
 
@@ -222,19 +223,25 @@ def sweep_command(
             shown = {"progress": lambda done, total: advance(f"{done} of {total} points", done)}
             data = sweep(ride, over, **how.arguments(file=kept_file("sweep.nc"), **shown))
         remarks = beyond_vehicles(car, over) + [str(warning.message) for warning in caught]
-        screen.table(data.jaxdamp.table())
+        at_start = {name: float(value) for name, value in ride().items()} if limits else {}
+        spans = limit_spans(limits, names, at_start)
+        before = None if beside is None else dict(ride.of_vehicle(beside)())
+        table = data.jaxdamp.table()
+        _show_points(screen, table, lambda: best_points(data, spans, before))
         remarks += stationary_notes(ride.vehicle, surface) if isinstance(surface, WhiteRoad) else []
         remarks += [f"No effect on {name}: {', '.join(flat)}." for name, flat in without_effect(data).items()]
         screen.points(remarks, style="yellow")
         with work.saving("Tables") as draft:
-            write_tables(draft, {"sweep": data.jaxdamp.table()})
+            write_tables(draft, {"sweep": table})
             data.to_netcdf(draft / "sweep.nc", engine="scipy")
-        at_start = {name: float(value) for name, value in ride().items()} if limits else {}
-        marks = {
-            "limits": limit_spans(limits, names, at_start),
-            "baseline": None if beside is None else dict(ride.of_vehicle(beside)()),
-        }
-        work.page(sweep_report, data, remarks=remarks, **marks)
+        work.page(sweep_report, data, remarks=remarks, limits=spans, baseline=before)
+
+
+def _show_points(screen: Screen, table: Table, best: Callable[[], list[str]]) -> None:
+    """The first points of a sweep; of a large one also where its results are smallest."""
+    screen.table(table.first(MOST_POINTS if screen.verbose else ON_SCREEN))
+    if len(table.rows) > ON_SCREEN:
+        screen.points([f"sweep.csv has all {len(table.rows)} points.", *best()])
 
 
 def _limits_by_metric(limit: Mapping[str, Any], car: AbstractVehicle, *, white: bool) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, write_laws
 from jaxdamp.dampers import CoulombFriction
 from jaxdamp.identify import Failure, VehicleComparison, VehicleFit, VehicleRung
 from jaxdamp.report import ride_records_table, vehicle_comparison_report, vehicle_fit_report
-from jaxdamp.rig import Sensor
+from jaxdamp.rig import Rig, Sensor
 from jaxdamp.tune import damper_paths
 from jaxdamp.vehicles import AbstractVehicle, Guide, Guided
 
@@ -133,7 +133,8 @@ def fit_arguments(
         paths = {f"car.{path}": runs for path, runs in benches.items()}
     more["sensors"] = sensor_words(given.get("sensors", ()), rides)
     machine = identify.machine_names("rig", given.get("rig", ())) or None
-    bounds = bounds_in_si(given.get("bounds", {}), [car])
+    parts = {"vehicle": car, "sensors": more["sensors"], "rig": Rig()}
+    bounds = bounds_in_si(given.get("bounds", {}), [parts])
     return car, how.arguments(**more, bench=paths, rig=machine, bounds=bounds)
 
 

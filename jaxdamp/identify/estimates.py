@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from jaxdamp._tables import Cell, Column, Shown, Table, rounded, with_tied
+from jaxdamp._display import rounded
+from jaxdamp._tables import Cell, Column, Shown, Table, with_tied
 from jaxdamp.parameters import Module, free_parameters
 
 

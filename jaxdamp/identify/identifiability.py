@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from jaxdamp._tables import plus_minus
+from jaxdamp._display import plus_minus
 from jaxdamp.bench import BenchRun
 from jaxdamp.identify.estimates import Estimate
 from jaxdamp.identify.model import STARTS

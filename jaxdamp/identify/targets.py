@@ -11,9 +11,10 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from jaxdamp import _checks
+from jaxdamp._display import plus_minus
 from jaxdamp._one_thread import one_thread
 from jaxdamp._results import drawn_by
-from jaxdamp._tables import Column, Table, plain, plus_minus
+from jaxdamp._tables import Column, Table, plain
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import Reach, without_fitted_ranges
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, priors_on, solve_by

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from jaxdamp import metrics
+from jaxdamp._display import display
 from jaxdamp._tables import typeset_unit
 from jaxdamp._types import Axes
 from jaxdamp.plots import _rides, _sheet, _style, fitted_range
@@ -77,7 +78,7 @@ def road(axes: Axes, shown: _rides.Rides) -> None:
     axes.set_ylim(0.2 * low * line[-1], 4.0 * high * line[0])
     axes.set_xlim(n[0], n[-1])
     _style.plain_log_axis(axes.xaxis)
-    title = f"Road: ISO 8608 class {name}, {_style.short(speed)} m/s"
+    title = f"Road: ISO 8608 class {name}, {display().speed(speed)}"
     _style.dress(axes, "spatial frequency [cycle/m]", "height PSD [m³]", title)
 
 

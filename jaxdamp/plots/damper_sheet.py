@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from jaxdamp import _checks
-from jaxdamp._tables import rounded, typeset_unit
+from jaxdamp._display import rounded
+from jaxdamp._tables import typeset_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Axes, Figure
 from jaxdamp.bench import BenchRun, Evaluation, LimitCheck, evaluate, last_steady_cycle, peak_velocity_points

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp._tables import rounded
+from jaxdamp._display import rounded
 from jaxdamp._types import Axes, Figure
 from jaxdamp.bench import (
     BenchRun,

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from jaxdamp._display import display
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Figure
 from jaxdamp.plots import _ride_panels, _rides, _sheet, _style
@@ -79,7 +80,7 @@ def _changes(shown: _rides.Rides) -> str:
 
 def _facts(shown: _rides.Rides) -> str:
     """Speed, time and roads that were not seen, in a line."""
-    facts = [f"{_style.short(shown.speed)} m/s"] if shown.speed is not None else []
+    facts = [display().speed(shown.speed)] if shown.speed is not None else []
     facts += [f"{_style.short(float(shown.responses[0].time[-1]))} s"] if shown.responses else []
     facts += [f"{shown.fresh.roads} roads that the tuning had not seen"] if shown.fresh is not None else []
     return " · ".join(facts)

@@ -15,6 +15,7 @@ from jaxdamp.tune import limit_spans
 
 
 MOST_AXES = 2  # of a grid that is drawn
+MOST_POINTS = 1000  # in the table of a page
 
 
 def sweep_report(
@@ -27,7 +28,7 @@ def sweep_report(
     folder: Path | None = None,
     attempts: Attempts | None = None,
 ) -> Report:
-    """A page on a sweep over a grid.
+    """A page on a sweep over a grid. Its table has the first thousand points, `data.jaxdamp.table()` has all.
 
     Arguments:
         data: of `jaxdamp.sweep`.
@@ -52,7 +53,7 @@ def sweep_report(
             report.picture(lambda m=metric: plots.sweep(data, m, limits=limits), path_words(metric), f"{metric}.png")
     else:
         report.text(f"Grids of more than {MOST_AXES} axes are not drawn.")
-    report.table(data.jaxdamp.table())
+    report.table(data.jaxdamp.table().first(MOST_POINTS))
     return report
 
 

@@ -167,8 +167,8 @@ def read_profile(
     _checks.one_of("height_unit", height_unit, _LENGTHS)
     names, table = _table(Path(path))
     columns = [height] if isinstance(height, str | int) else list(height)
-    heights = np.stack([table[:, _column("height", column, names)] for column in columns], axis=1)
-    positions = table[:, _column("position", position, names)] * units[unit]
+    heights = np.stack([table[:, _column("height", column, names, path)] for column in columns], axis=1)
+    positions = table[:, _column("position", position, names, path)] * units[unit]
     return from_profile(positions, heights * _LENGTHS[height_unit], speed, periodic=periodic, ramp=ramp)
 
 
@@ -180,6 +180,8 @@ def _table(path: Path) -> tuple[list[str], np.ndarray]:
     rows = [[field.strip() for field in row] for row in split]
     has_names = not all(map(_is_number, rows[0]))
     names = rows.pop(0) if has_names else [str(number) for number in range(len(rows[0]))]
+    if not rows:
+        _checks.refuse("path", "name a file with numbers", f"{path}, which has only {lines[0]!r}")
     wrong = [i for i, row in enumerate(rows, has_names) if len(row) != len(names) or not all(map(_is_number, row))]
     if wrong:
         remedy = "Remarks begin with # or %; decimals have a point."
@@ -205,10 +207,10 @@ def _is_number(field: str) -> bool:
     return True
 
 
-def _column(argument: str, column: Column, names: list[str]) -> int:
+def _column(argument: str, column: Column, names: list[str], path: object) -> int:
     if isinstance(column, str):
         _checks.one_of(argument, column, names)
         return names.index(column)
     if not 0 <= column < len(names):
-        _checks.refuse(argument, f"be a column from 0 to {len(names) - 1}", column, f"The file has {names}.")
+        _checks.refuse(argument, f"be a column from 0 to {len(names) - 1}", column, f"{path} has {names}.")
     return column

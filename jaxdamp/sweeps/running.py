@@ -134,6 +134,11 @@ class Runner:
         pace.calls, pace.seconds = pace.calls + 1, min(pace.seconds, seconds / size)
 
 
+def _of_machine(error: BaseException | None) -> bool:
+    """Whether the machine refused something, not what was asked for; between the two JAX puts its own stack trace."""
+    return error is not None and (isinstance(error, OSError) or _of_machine(error.__cause__))
+
+
 def _last_line(error: str) -> str:
     """What a user wrote into an error, out of the report of a callback that raised."""
     lines = [line for line in error.splitlines() if re.match(r"\S*(Error|Exception)\S*: ", line)]
@@ -211,7 +216,9 @@ class Computation:
             with warnings.catch_warnings(action="ignore"):  # of axes, which were given before
                 printed_trace = trace(printed, list(traced.axes), False)._replace(fingerprint=traced.fingerprint)
             return prepare(printed_trace, count, self._chunk, self._devices, _lanes(printed))
-        except NotImplementedError:
+        except NotImplementedError as error:
+            if _of_machine(error):
+                warnings.warn(f"{error} This sweep goes on with the loop of XLA.", stacklevel=2)
             return None
 
     @property

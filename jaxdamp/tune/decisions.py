@@ -10,11 +10,12 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._display import plus_minus
 from jaxdamp._field_types import check_module
 from jaxdamp._jacobian import with_jacobian
 from jaxdamp._progress import Progress
 from jaxdamp._results import AbstractResult, drawn_by
-from jaxdamp._tables import Column, Table, plain, plus_minus, typeset_unit
+from jaxdamp._tables import Column, Table, plain, typeset_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.metrics import Metric

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array
 
 from jaxdamp import _checks
-from jaxdamp._tables import plus_minus
+from jaxdamp._display import plus_minus
 from jaxdamp._types import Scalar
 from jaxdamp.metrics import (
     STATISTICS,

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from jaxdamp.bench import BenchRun, Limit, evaluate, read, read_limits, separate_gas_and_friction
+from jaxdamp.bench import BenchRun, Limit, SineTest, VirtualDyno, evaluate, read, read_limits, separate_gas_and_friction
+from jaxdamp.dampers import Bilinear
 
 
 REBOUND, COMPRESSION, GAS, RATE, FRICTION = 2600.0, 1200.0, -150.0, 800.0, 40.0  # N s/m, N s/m, N, N/m, N
@@ -163,6 +164,21 @@ def test_forces_at_stated_velocities(method, evaluation):
         assert np.isnan(evaluation.get("rebound force", velocity=2.0).value)  # never extrapolated
     else:
         assert evaluation.velocities == (0.052, 0.131, 0.262, 0.393)
+
+
+def test_records_that_reach_no_usual_velocity_state_another_and_say_so():
+    dyno = VirtualDyno(Bilinear(2000.0, 1000.0))
+    runs = dyno.run([SineTest(0.02, f) for f in (1.4, 1.65)])  # 0.176 and 0.207 m/s
+    between = evaluate(runs)
+    assert between.velocities == (0.2,) and len(between.table().rows) == 3
+    assert between.get("rebound force", velocity=0.2).value == pytest.approx(400.0, rel=1e-3)
+    assert "the records give forces from 0.175 to 0.206 m/s. Forces are stated at 0.2 m/s." in between.notes[0]
+    slow = evaluate(dyno.run([SineTest(0.005, 1.0)]))  # 0.0314 m/s, on its loop
+    assert slow.velocities == (0.031,)
+    assert slow.get("compression force", velocity=0.031).value == pytest.approx(-31.0, rel=0.01)
+    beyond = evaluate(runs, velocities=(0.2, 0.3))
+    assert beyond.notes[0] == "No force at 0.3 m/s: the records give forces from 0.175 to 0.206 m/s."
+    assert len(beyond.table().rows) == 3
 
 
 def test_a_window_takes_records_near_the_stated_velocity_only(evaluation):

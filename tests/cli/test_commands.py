@@ -103,13 +103,15 @@ def test_fit_writes_tables_pictures_and_a_report(records: Path, tmp_path: Path) 
 
 def test_what_the_machine_adds_is_fitted_and_shown(records: Path, tmp_path: Path) -> None:
     out = tmp_path / "fit"
-    text = jaxdamp("fit", records, "--law", "bilinear", "--rig", "gas,friction", "--out", out).output
+    words = ["--rig", "gas,friction", "--bound", "rig.gas_force=-0.5lbf:0.5 lbf", "--bound", "friction=1N:20N"]
+    text = jaxdamp("fit", records, "--law", "bilinear", *words, "--out", out).output
     assert "rig.gas_force" in text and "rig.friction" in text
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "rig.gas_force" in page and "effects of the test machine: gas force" in page
     assert "Taken as absent: " in page and "gas stiffness" in page
     machine = from_json(out / "machines" / "bilinear.json")
-    assert abs(float(machine.gas_force)) < 5.0 and float(machine.force_offset) == 0.0
+    assert abs(float(machine.gas_force)) < 0.5 * 4.4483 and float(machine.force_offset) == 0.0
+    assert 1.0 <= float(machine.friction) < 1.1  # none in the records
     bare, copy = tmp_path / "bare", tmp_path / "copy" / "fit.html"
     words = ["--rig", "none", "--out", bare, "--cross-validate", "--report", copy]
     assert "rig." not in jaxdamp("fit", records, "--law", "bilinear", *words).output

@@ -18,7 +18,7 @@ from jaxdamp.export import from_json
 
 NUMBER = re.compile(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?")
 ROOT = Path(__file__).parents[2]
-MOMENTS = 10  # of each signal in each command
+MOMENTS, SOME = 10, 3  # of each signal in each command before a release, and of one of them otherwise
 COMMANDS = {
     "fit": "fit {records} --law linear,besinger",
     "sweep": "sweep quarter_car_000 iso:C --over damper.rate=1000:4000:40 --duration 2",
@@ -48,14 +48,18 @@ def _numbers(folder: Path) -> dict[str, str]:
     return tables | {file.name: repr(from_json(file)) for file in sorted(folder.rglob("laws/*.json"))}
 
 
-@pytest.mark.exhaustive
+@pytest.mark.slow
 @pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_signal_at_any_moment_loses_nothing(tmp_path: Path, records: Path, name: str, number: str) -> None:
+@pytest.mark.exhaustive_cases("fit-SIGINT", "fit-SIGTERM", "sweep-SIGINT", "report-SIGINT", "report-SIGTERM")
+def test_a_signal_at_any_moment_loses_nothing(
+    tmp_path: Path, records: Path, name: str, number: str, request: pytest.FixtureRequest
+) -> None:
     words = COMMANDS[name].format(records=records).split()
     whole = _command(*words, "--out", "whole", folder=tmp_path)
     assert whole.returncode == 0, whole.stderr
-    moments = np.random.default_rng(sum(map(ord, name + number))).uniform(0.0, 6.0, MOMENTS)
+    count = MOMENTS if "exhaustive" in request.config.getoption("-m") else SOME
+    moments = np.random.default_rng(sum(map(ord, name + number))).uniform(0.0, 6.0, count)
     moments = ",".join(f"{moment:.3f}" for moment in moments)
     driver = [sys.executable, "-m", "tests.cli.sudden_ends", number, moments, "--", *words, "--out", "{number}"]
     done = subprocess.run(
@@ -63,7 +67,7 @@ def test_a_signal_at_any_moment_loses_nothing(tmp_path: Path, records: Path, nam
     )
     assert done.returncode == 0, done.stderr
     ends = [json.loads(line) for line in done.stdout.splitlines()]
-    assert len(ends) == MOMENTS
+    assert len(ends) == count
     stopped = {"SIGINT": 130, "SIGTERM": 143}[number]
     assert any(end["code"] == stopped for end in ends), ends
     for end in ends:
@@ -126,19 +130,21 @@ def test_a_full_disk_is_named_and_leaves_what_was_there(tmp_path: Path, records:
         assert again.returncode == 0 and not (disk / "out" / "UNFINISHED.txt").exists(), again.stderr
 
 
-@pytest.mark.exhaustive
-def test_where_nothing_runs_from_the_temporary_folder_results_are_the_same(tmp_path: Path, records: Path) -> None:
-    fit = ["fit", records, "--law", "bilinear,linear_friction_lag"]
-    sweep = COMMANDS["sweep"].split()
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["fit", "sweep"])
+@pytest.mark.exhaustive_cases("sweep")
+def test_where_nothing_runs_from_the_temporary_folder_results_are_the_same(
+    tmp_path: Path, records: Path, name: str
+) -> None:
+    words = COMMANDS[name].format(records=records).replace("linear,besinger", "bilinear").split()
     with _small_disk(tmp_path / "temporary", "size=200m,noexec") as disk:
         more = {"TMPDIR": str(disk), "XDG_CACHE_HOME": str(disk / "cache")}
-        for words, out in ((fit, "fit"), (sweep, "sweep")):
-            plain = _command(*words, "--out", f"{out}_plain", folder=tmp_path)
-            done = _command(*words, "--out", f"{out}_noexec", folder=tmp_path, **more)
-            assert (plain.returncode, done.returncode) == (0, 0), (plain.stderr, done.stderr)
-            ours, theirs = (_numbers(tmp_path / f"{out}_{kind}") for kind in ("plain", "noexec"))
-            assert ours.keys() == theirs.keys()
-            for name in ours:  # one by a program of C, the other by XLA
-                assert NUMBER.sub("#", ours[name]) == NUMBER.sub("#", theirs[name])
-                pairs = (np.array(NUMBER.findall(text), float) for text in (ours[name], theirs[name]))
-                np.testing.assert_allclose(*pairs, rtol=1e-4, atol=1e-9, err_msg=name)
+        plain = _command(*words, "--out", "plain", folder=tmp_path)
+        done = _command(*words, "--out", "noexec", folder=tmp_path, **more)
+        assert (plain.returncode, done.returncode) == (0, 0), (plain.stderr, done.stderr)
+    ours, theirs = (_numbers(tmp_path / kind) for kind in ("plain", "noexec"))
+    assert ours.keys() == theirs.keys()
+    for name in ours:  # one by a program of C, the other by XLA
+        assert NUMBER.sub("#", ours[name]) == NUMBER.sub("#", theirs[name])
+        pairs = (np.array(NUMBER.findall(text), float) for text in (ours[name], theirs[name]))
+        np.testing.assert_allclose(*pairs, rtol=1e-4, atol=1e-9, err_msg=name)

@@ -118,7 +118,17 @@ def test_bench_records_guides_and_two_records_in_one_fit(files: dict[str, Path],
     dyno.run([bench.SineTest(0.02, 1.0), bench.SineTest(0.02, 3.0)]).write(tmp_path / "bench")
     out = tmp_path / "out"
     words = ["--start", files["law.json"], "--guide", "sprung:friction=25", "--bench", tmp_path / "bench"]
-    words += ["--rig", "gas", "--over", "*_mass,spring_rate,tyre_stiffness,damper.*_rate", *COARSE, "--out", out]
+    words += [
+        "--rig",
+        "gas",
+        "--bound",
+        "rig.gas_force=-100 lbf:-1 lbf",
+        "--over",
+        "*_mass,spring_rate,tyre_stiffness,damper.*_rate",
+        *COARSE,
+        "--out",
+        out,
+    ]
     records = [tmp_path / f"{name}.csv" for name in names]
     text = jaxdamp("fit-vehicle", files["car.toml"], *records, *words).output
     found = {r["parameter"]: r for r in csv.DictReader((out / "parameters.csv").read_text().splitlines())}

@@ -200,6 +200,42 @@ def test_a_link_in_the_folder_leads_nowhere_else(tmp_path: Path) -> None:
     assert written(elsewhere) == ["b.txt", "mine.txt"]
 
 
+@pytest.mark.parametrize("staged", [False, True])
+def test_nothing_is_written_through_a_link(tmp_path: Path, staged: bool) -> None:
+    target, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "b.txt").write_text("precious")
+    for _ in range(2):
+        _write(target, "a.txt", replace=True)
+        if not (target / "laws").exists():
+            (target / "laws").symlink_to(elsewhere)
+        with results_folder(target, "test", replace=True) as results:
+            if staged:
+                _fill(results.draft, "a.txt")
+                results.publish("the laws")
+            _fill(results.draft, "laws/b.txt", "laws/deep/c.txt")
+        assert written(elsewhere) == ["b.txt"] and (elsewhere / "b.txt").read_text() == "precious"
+        assert not (target / "laws").is_symlink() and (target / "laws/b.txt").read_text() == "laws/b.txt"
+    (target / ".previous").rename(tmp_path / "moved")
+    (target / ".previous").symlink_to(elsewhere)
+    with pytest.raises(ValueError, match="previous' is a link"):
+        _write(target, "a.txt", replace=True)
+
+
+def test_a_changed_file_that_is_replaced_late_is_kept(tmp_path: Path) -> None:
+    target = tmp_path / "out"
+    _write(target, "law.json", "report.html")
+    (target / "report.html").write_text("with notes")
+    with results_folder(target, "test", replace=True) as results:
+        _fill(results.draft, "law.json")
+        results.publish("the report")
+        _fill(results.draft, "report.html")
+        results.publish("the pictures")
+        _fill(results.draft, "report.html")
+    texts = _texts(target)
+    assert texts["report.html"] == "report.html" and texts[".previous/report.html"] == "with notes"
+
+
 def test_a_file_that_was_changed_stays(tmp_path: Path) -> None:
     target = tmp_path / "out"
     _write(target, "law.json", "table.csv")

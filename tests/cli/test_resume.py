@@ -125,7 +125,9 @@ def test_a_sweep_goes_on_after_its_finished_points(cache: Path, monkeypatch: pyt
     runner = sweeping.Computation.runner
     monkeypatch.setattr(sweeping.Computation, "runner", lambda self, count: left.append(count) or runner(self, count))
     jaxdamp(*words, "--out", "out", "--resume")
-    jaxdamp(*words, "--out", "whole")
+    output = jaxdamp(*words, "--out", "whole").output
+    assert "the first 30 of 40 rows" in output and "sweep.csv has all 40 points" in output
+    assert "Smallest body acceleration" in " ".join(output.split())
     assert 0 < left[0] < left[1] == 40 and not list(cache.iterdir())
     _assert_same(_numbers("out"), _numbers("whole"), exact=False)
 

@@ -50,3 +50,10 @@ def test_what_says_nothing_of_a_sheet_is_refused(sheet: Path) -> None:
     assert "without hysteresis" in refused(sheet.parent, *words, "--law", "bouc_wen")
     assert "force-velocity table" in refused(sheet.parent, *words, "--cross-validate")
     assert "'imperial'" in refused(sheet.parent, *words, "--units", "imperal")
+
+
+def test_units_outside_their_table_are_not_overlooked(sheet: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(sheet.parent)
+    (sheet.parent / "jaxdamp.toml").write_text('units = "imperial"\n')
+    said = refused(sheet.parent, "fit", sheet, "--units", "imperial", "--out", sheet.parent / "a")
+    assert "must stand under [show], but is 'imperial' above all tables in jaxdamp.toml" in said

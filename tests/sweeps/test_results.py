@@ -8,7 +8,8 @@ import pytest
 import xarray
 
 import jaxdamp
-from jaxdamp.report.sweeps import best_points
+from jaxdamp.report import sweep_report
+from jaxdamp.report.sweeps import MOST_POINTS, best_points
 from jaxdamp.sweeps import points, random, running, sobol, without_effect
 
 from .cases import AXES, Decay, decay, failing
@@ -335,3 +336,10 @@ def test_an_axis_without_effect_is_named_and_no_value_of_it_is_called_the_best()
     (smallest,) = [sentence for sentence in sentences if sentence.startswith("Smallest")]
     assert smallest.startswith("Smallest area") and "b =" not in smallest
     assert without_effect(jaxdamp.sweep(product, {"a": [1.0], "b": [2.0, 3.0]})) == {}
+
+
+def test_the_page_of_a_large_grid_has_its_first_points():
+    axes = {name: np.linspace(1.0, 2.0, 11) for name in "abc"}
+    data = jaxdamp.sweep(lambda p: {"volume": p["a"] * p["b"] * p["c"]}, axes)
+    page = sweep_report(data).to_html()
+    assert page.count("<tr>") == 1 + MOST_POINTS and "the first 1000 of 1331 rows" in page

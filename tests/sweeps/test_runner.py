@@ -5,6 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from jaxdamp import Ride, roads, vehicles
+from jaxdamp.codegen import _native
 from jaxdamp.sweeps import points, running
 from jaxdamp.sweeps.function import trace
 from jaxdamp.sweeps.program import Program, prepare
@@ -59,6 +61,18 @@ def test_a_short_sweep_asks_for_no_other_program(program):
     one, taken = program(0.009)
     run(one, lambda: pytest.fail("asked for"))
     assert sum(taken) == COUNT
+
+
+def test_a_loop_that_the_machine_does_not_load_is_left_to_xla_with_a_word(monkeypatch):
+    def unloadable(*_):
+        raise OSError("failed to map segment from shared object")
+
+    monkeypatch.setattr(_native, "_compiled", unloadable)
+    road = roads.cosine_bump(0.05, start=0.1, length=1.0, speed=10.0)
+    ride = Ride(vehicles.presets.quarter_car_000(), road, metrics=["peak_sprung_acceleration"], duration=0.3)
+    computation = running.Computation(ride, points({"damper.rate": np.array([1000.0, 2000.0])}))
+    with pytest.warns(UserWarning, match="failed to map .* TMPDIR. This sweep goes on with the loop of XLA"):
+        assert computation._printed(2) is None
 
 
 def test_without_another_program_the_first_does_all(program):

@@ -8,6 +8,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError
+from jaxdamp._one_thread import one_thread
 from jaxdamp.bench.analysis import FoldedCycles, as_records, fold_cycles
 from jaxdamp.bench.contradictions import repeats
 from jaxdamp.bench.evaluation import curve
@@ -21,6 +22,7 @@ from jaxdamp.bench.settings import by_number, settings_apart
 WINDOW = 0.05  # share of a stated velocity within which samples, or records, count as taken at it
 
 
+@one_thread()
 def evaluate(
     runs: BenchRun | Iterable[BenchRun],
     *,
@@ -33,7 +35,8 @@ def evaluate(
 
     Arguments:
         runs: one record or several.
-        velocities: at which forces are stated [m/s]; those of `OEM_VELOCITIES` that the records reach, if left out.
+        velocities: at which forces are stated [m/s]; those of `OEM_VELOCITIES` that the records reach, if left out, or
+            the largest that the records of all settings reach, if they reach none of these.
         method: "interpolation" between the peak forces of records; "window": of the records whose peak velocity is
             within `window` of the stated one; "loop": on the continuous loop of the fastest record. Interpolation
             where every setting has two records or more of different peak velocity, the loop elsewhere, if left out.
@@ -74,6 +77,8 @@ def evaluate(
         else:
             measurements += [replace(m, setting=name) for m in gas[name].measurements if np.isfinite(m.value)]
             notes += [f"{slowest.name}: {gas[name].note}"] if gas[name].note else []
+    missed, found = _not_reached(velocities, settings, cycles, measurements, method, window)
+    measurements, notes = measurements + found, missed + notes
     stated = tuple(sorted({m.velocity for m in measurements if m.velocity is not None}))
     return Evaluation(tuple(measurements), settings, cycles, gas, stated, method, tuple(notes))
 
@@ -101,7 +106,7 @@ def _of_setting(
 ) -> list[Measurement]:
     """The figures of the records at one setting, its forces at the stated velocities, its rates and knees."""
     of_records = [m for run in runs for m in record_measurements(cycles[run.name], name, run.name)]
-    peaks = {direction: _peak_forces(runs, of_records, direction) for direction in curve.DIRECTIONS}
+    peaks = _peaks_of(name, runs, of_records)
     fastest = max(runs, key=lambda run: run.peak_velocity).name
     at_velocities = _at_velocities(velocities, peaks, cycles[fastest], name, method, window)
     return [*of_records, *at_velocities, *curve.rates_and_knees(cycles[fastest], name, fastest)]
@@ -191,6 +196,52 @@ def _at_velocities(
         measurements += [Measurement(f"{name} force", "N", *force, **more) for name, force in forces.items()]
         measurements.append(Measurement("rebound/compression ratio", "", *_ratio(*forces.values()), **more))
     return measurements
+
+
+def _not_reached(
+    velocities: Sequence[float] | None,
+    settings: Mapping[str, Sequence[BenchRun]],
+    cycles: Mapping[str, FoldedCycles],
+    measurements: Sequence[Measurement],
+    method: str,
+    window: float,
+) -> tuple[list[str], list[Measurement]]:
+    """Sentences on velocities at which no record gives a force; and forces at another one, where none was stated."""
+    reached = {m.velocity for m in measurements if m.velocity is not None and np.isfinite(m.value)}
+    missed = [v for v in velocities or () if v not in reached]
+    if not missed and (velocities is not None or reached):
+        return [], []
+    peaks = {name: _peaks_of(name, runs, measurements) for name, runs in settings.items()}
+    low, high, where = _span(peaks, method)
+    if velocities is not None:
+        return [f"No force at {v:.4g} m/s: {where}." for v in missed], []
+    found, instead = list[Measurement](), "Add records of other velocities."
+    if low < high:
+        digits = 1 - int(np.floor(np.log10(high)))
+        velocity = max(float(np.floor(high * 10.0**digits) / 10.0**digits), low)
+        instead = f"Forces are stated at {velocity:.4g} m/s."
+        for name, runs in settings.items():
+            fastest = cycles[max(runs, key=lambda run: run.peak_velocity).name]
+            found += _at_velocities([velocity], peaks[name], fastest, name, method, window)
+    usual = f"None of the usual velocities, from {curve.OEM_VELOCITIES[0]:g} m/s on, is reached"
+    return [f"{usual}: {where}. {instead}"], found
+
+
+def _peaks_of(
+    setting: str, runs: Sequence[BenchRun], measurements: Sequence[Measurement]
+) -> dict[str, list[curve.PeakForce]]:
+    """Forces at the peak velocities of the records of a setting, by direction."""
+    of_records = [m for m in measurements if m.record and m.setting == setting]
+    return {direction: _peak_forces(runs, of_records, direction) for direction in curve.DIRECTIONS}
+
+
+def _span(peaks: Mapping[str, Mapping[str, Sequence[curve.PeakForce]]], method: str) -> tuple[float, float, str]:
+    """The lowest and highest velocity at which the records of all settings give a force, equal if at none; in words."""
+    spans = [[point.velocity for point in points] for both in peaks.values() for points in both.values() if points]
+    low, high = max(map(min, spans), default=0.0), min(map(max, spans), default=0.0)
+    low = 0.0 if method == "loop" else low
+    words = f"the records give forces from {low:.3g} to {high:.3g} m/s" if low < high else "the records enclose none"
+    return low, max(low, high), words
 
 
 def _ratio(

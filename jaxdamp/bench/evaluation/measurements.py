@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from jaxdamp._tables import Cell, Shown, plus_minus
+from jaxdamp._display import plus_minus
+from jaxdamp._tables import Cell, Shown
 from jaxdamp.bench.analysis import NEAR_PEAK, FoldedCycles
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._one_thread import one_thread
 from jaxdamp._results import AbstractResult, CallableText
 from jaxdamp._tables import Cell, Column, Table, plain
 from jaxdamp.bench.analysis import as_records
@@ -139,6 +140,7 @@ class Preflight(AbstractResult):
         return "\n".join([self.summary, *(f"- {sentence}" for sentence in self.sentences())])
 
 
+@one_thread()
 def preflight(runs: BenchRun | Iterable[BenchRun]) -> Preflight:
     """Look over records before anything is computed from them.
 
