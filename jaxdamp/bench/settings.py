@@ -4,10 +4,15 @@ import itertools
 import re
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from jaxdamp import _checks
 from jaxdamp.bench.contradictions import contradictions, same_motion
 from jaxdamp.bench.runs import BenchRun
+from jaxdamp.bench.units import conversion
 
+
+TEMPERATURE = "temperature"  # the setting that states how warm the damper is when a record begins
 
 Settings = Mapping[str, float | int | str]
 _FIELD = re.compile(r"\{(\w*)\}")
@@ -72,6 +77,36 @@ def _add(settings: dict, more: Settings, name: str) -> None:
         if settings.setdefault(key, value) != value:
             must = f"give each setting one value, as {key} of {name!r}"
             _checks.refuse("settings", must, f"{settings[key]!r} and {value!r}")
+
+
+def initial_temperature(run: BenchRun) -> float | None:
+    """Temperature [K] of the damper at the first sample: by its channel, or by the setting `temperature` with a unit.
+
+    Arguments:
+        run: a record, such as one with the setting `{"temperature": "80 degC"}`.
+
+    Raises:
+        ValueError: a setting without a unit of temperature.
+
+    >>> import dataclasses
+    >>> t = np.arange(200) / 100
+    >>> run = BenchRun.from_arrays("hot", t, np.sin(9 * t), np.cos(9 * t))
+    >>> initial_temperature(dataclasses.replace(run, settings={"temperature": "80 degC"}))
+    353.15
+    """
+    if run.temperature is not None:
+        return float(run.temperature[0])
+    stated = run.settings.get(TEMPERATURE)
+    if stated is None:
+        return None
+    match = _NUMBER.match(text := str(stated).strip())
+    by = conversion("temperature", text[match.end() :]) if match else None
+    if match is None or by is None:
+        remedy = 'Write `settings={"temperature": "80 degC"}`, or K, or degF.'
+        _checks.refuse("settings", f"state the temperature of {run.name!r} with its unit", repr(stated), remedy)
+    kelvin = float(by(np.asarray(float(match.group().replace(",", ".")))))
+    _checks.positive("temperature", kelvin, f"It is {text!r} of {run.name!r}.")
+    return kelvin
 
 
 _EDGE = r"(?<![A-Za-z\d.])"

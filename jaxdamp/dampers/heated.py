@@ -92,6 +92,10 @@ class Heated(AbstractWrapper):
         rise = temperature - self.reference_temperature
         return AtRise(self.law.at_temperature(temperature), rise, self.sensitivity, self.static_force_slope)
 
+    def values_at_start(self, temperature: ScalarLike) -> dict[str, ScalarLike]:
+        """ϑ at the start, T − T₀."""
+        return {"initial_rise": temperature - self.reference_temperature}
+
     def motion_inside(self, motion: Motion) -> list[tuple[AbstractDamper, Motion]]:
         """The same motion; the force inside is not known."""
         return [(self.law, motion.with_force(None))]

@@ -56,6 +56,10 @@ class TemperatureScaled(AbstractWrapper):
         law = (self.law.at_temperature(temperature), temperature)
         return eqx.tree_at(lambda whole: (whole.law, whole.temperature), self, law)
 
+    def values_at_start(self, temperature: ScalarLike) -> dict[str, ScalarLike]:
+        """T, which stays."""
+        return {"temperature": temperature}
+
     def is_linear_in_law(self) -> bool:
         """A factor is linear."""
         return True

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from jaxdamp import _checks
-from jaxdamp.bench import BenchRun, Contradiction, contradictions, pairs_in_words
+from jaxdamp.bench import BenchRun, Contradiction, contradictions, initial_temperature, pairs_in_words
 from jaxdamp.dampers import takes_command
 from jaxdamp.identify.model import Model, law_of, rig_of
 
@@ -19,7 +19,7 @@ def contradicting(model: Model, runs: Sequence[BenchRun]) -> list[Contradiction]
     """
     law, rig = law_of(model), rig_of(model)
     warms = law.traits().temperature_dependent or (rig is not None and "heat" in rig.effects())
-    if warms and all(run.temperature is not None for run in runs):
+    if warms and all(initial_temperature(run) is not None for run in runs):
         return []
     return contradictions(runs, same_command=takes_command(law) and all(run.commands is not None for run in runs))
 

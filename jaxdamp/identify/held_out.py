@@ -20,6 +20,9 @@ from jaxdamp.identify.model import Model
 from jaxdamp.identify.predicting import Compared, Score, compared, errors
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.propagation import Evidence
+from jaxdamp.identify.start_temperatures import Warmed, warmed
+from jaxdamp.identify.stated import start_paths
+from jaxdamp.parameters import get, with_values
 
 
 PARTS = 4  # into which records, or the time of each record, are divided
@@ -63,7 +66,8 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
     fitted = np.flatnonzero(np.isfinite(problem.sigma))
     runs = [problem.runs[i] for i in fitted]
     groups = motions(runs)
-    whole = len(groups) >= FEWEST_MOTIONS and not (in_time or problem.per_record)
+    own = set(problem.per_record)
+    whole = len(groups) >= FEWEST_MOTIONS and not in_time and own <= set(start_paths(result.model))
     samples: list[Compared] = []
     left_out = _by_record(runs, groups) if whole else zip(*map(in_time_parts, runs), strict=True)
     for number, part in enumerate(left_out, 1):
@@ -76,7 +80,12 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
         parts = zip(
             map(int, fitted), names, (left & near for left, near in zip(part, reached, strict=True)), strict=True
         )
-        samples += compared(_refitted(start, factor), problem.runs, problem.initial_state, parts)
+        models, told = _refitted(start, factor), [0] * len(problem.runs)
+        if whole and isinstance(models, list):  # each has a temperature of its own at its start
+            out = [int(i) for i, left in zip(fitted, part, strict=True) if left.all()]
+            for i, new in _warmed(models, out, result).items():
+                models[i], told[i] = new
+        samples += compared(models, problem.runs, problem.initial_state, parts, told)
     records = f"each of {len(runs)} records" if whole else f"each quarter of the record{'s' * (len(runs) > 1)}"
     same = ", all of one motion" * (len(groups) == 1)
     return _together(samples, f"{records} predicted by fits without it{same}")
@@ -95,7 +104,8 @@ def on_records(result: FitResult, runs: Sequence[BenchRun]) -> HeldOut | None:
             parts += [(i, f"{run.name}, part {k} of {PARTS}", part) for k, part in enumerate(in_time_parts(run), 1)]
         else:
             parts.append((i, run.name, np.ones(len(run), bool)))
-    samples = compared(result.model_of(runs), runs, result.initial_state, parts)
+    models, told = result.models_of(runs)
+    samples = compared(models, runs, result.initial_state, parts, told)
     return _together(samples, f"{len(runs)} record{'s' * (len(runs) > 1)} held out")
 
 
@@ -168,6 +178,14 @@ def anchored_at(evidence: Evidence) -> Problem:
     large = np.clip(np.abs(minimum.values), LEAST_CHANGE * by_force, by_force)
     weight = np.sqrt(minimum.squares / np.count_nonzero(problem.used)) / large
     return problem.started_at(minimum.values)._replace(anchor=(minimum.values, weight))
+
+
+def _warmed(models: Sequence[Model], out: Sequence[int], result: FitResult) -> dict[int, Warmed]:
+    """The models of records left out, which begin as warm as their first cycles show, about the mean of the others."""
+    others, paths = [model for i, model in enumerate(models) if i not in out], start_paths(models[0])
+    mean = {path: np.mean([np.asarray(get(model, path)) for model in others]) for path in paths}
+    how = (paths, result.rmse * result.inflation, result.initial_state)
+    return {i: warmed(with_values(models[i], mean), result.runs[i], *how) for i in out}
 
 
 @one_thread()

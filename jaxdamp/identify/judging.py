@@ -35,6 +35,7 @@ from jaxdamp.identify.model import (
     on_rig,
     rig_of,
     starts_in,
+    with_means,
     with_range,
 )
 from jaxdamp.identify.noise import Noise, noise_of
@@ -131,7 +132,8 @@ def on_status(best: SearchEnd, remedy: str = "") -> list[str]:
 
 def fitted_models(problem: Problem, values: np.ndarray) -> tuple[list[Model], Model]:
     """The fitted model of each record, where they differ, and the one with the mean of what differs."""
-    built = with_range(problem.free.started_at(values).tree, covered_range(problem.fitted_to))
+    warms = problem.law.traits().temperature_dependent
+    built = with_range(problem.free.started_at(values).tree, covered_range(problem.fitted_to, warms=warms))
     if starts := starts_in(built):
         fitted = [s if np.isfinite(sigma) else None for s, sigma in zip(starts, problem.sigma, strict=True)]
         built = on_rig(law_of(built), rig_of(built), fitted)
@@ -141,7 +143,7 @@ def fitted_models(problem: Problem, values: np.ndarray) -> tuple[list[Model], Mo
     models = [
         of_record(with_values(built, {path: v[i] for path, v in own.items()}), i) for i in range(len(problem.runs))
     ]
-    return models, with_values(built, {path: jnp.mean(v) for path, v in own.items()})
+    return models, with_means(built, problem.per_record)
 
 
 def notes_on(model: Model, runs: Sequence[BenchRun]) -> list[str]:
