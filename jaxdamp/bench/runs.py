@@ -58,7 +58,7 @@ class BenchRun:
             choice; for laws that take a command (`dampers.with_command`).
         command_channel: what was set instead if it varies during the record, as measured, shape (time,).
         command_unit: unit of this channel: "A", "V" or "%".
-        settings: what else is known of the record, by name: clicks, temperature, the test.
+        settings: what else is known of the record, by name: clicks, the test, the temperature at the start ("80 degC").
         source: the file, or what else the record comes from.
         notes: sentences on what was done to the data.
         stroke_is_integrated: the stroke was integrated from the velocity, so that its zero is the middle of the motion

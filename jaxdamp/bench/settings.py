@@ -39,7 +39,7 @@ def settings_by_name(names: Sequence[str], given: str | Mapping[str, Settings] |
     if given is None:
         return settings
     table = {given: {}} if isinstance(given, str) else given
-    must = 'map patterns to settings, such as {"*_hot": {"temperature": 80}}, or be a pattern such as "*_{current}A"'
+    must = 'map patterns to settings, {"*_hot": {"temperature": "80 degC"}}, or be a pattern such as "*_{current}A"'
     _checks.instance("settings", table, Mapping, must)
     for pattern, values in table.items():
         _checks.instance("settings", values, Mapping, must)

@@ -45,8 +45,9 @@ class Heated(AbstractWrapper):
     freeze `cooling_time` and `initial_rise`.
 
     Records without a temperature determine only κ/C and s/C; the heat capacity is therefore a setting, by default that
-    of 2 kg of steel, and then ϑ is an estimate. Records that begin warm have their own start:
-    `fit(..., per_record=["initial_rise"])`.
+    of 2 kg of steel, and then ϑ is an estimate. Records that begin warm have their own start: stated by their setting
+    `temperature` ("60 degC"), or fitted, `fit(..., per_record=["initial_rise"])`; then a new record is predicted from
+    the start that its first cycles show. The heat flows into a room at T₀.
 
     State: ϑ [K], then the states of the law. The step takes the power as the mean of both ends, second order.
 

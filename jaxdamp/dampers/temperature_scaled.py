@@ -21,9 +21,9 @@ class TemperatureScaled(AbstractWrapper):
     which decreases faster and nonlinearly. The linear approximation is valid for about 40 K around T₀. The factor must
     be positive (κ (T − T₀) < 1), otherwise the law would add energy to the motion; the constructor refuses this.
 
-    Fits take T from the temperature channel of the records, sample by sample, and `respond` takes it as an argument.
-    The stated temperature is for motions where none was measured; records of which only some have the channel are
-    refused.
+    Fits take T from the temperature channel of the records, sample by sample, or from their setting `temperature`
+    ("60 degC"), and `respond` takes it as an argument. The stated temperature is for motions where none was measured;
+    records of which only some have the channel, or the setting, are refused.
 
     Scale only the oil forces: gas pressure increases with temperature, and springs do not depend on it, so write
     `SeriesSpring(TemperatureScaled(law, ...), ...)` and `TemperatureScaled(law, ...) + GasSpring(...)`. κ is

@@ -6,7 +6,7 @@ import os
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import ClassVar, Generic, TypeVar, cast
 
 import jax
 import jax.numpy as jnp
@@ -29,6 +29,7 @@ C = TypeVar("C", bound="AbstractComparison")  # not `Self`, which run-time type 
 Names = str | Sequence[str] | Mapping[str, object] | None
 Start = TypeVar("Start")
 Outcome = TypeVar("Outcome")
+V = TypeVar("V")  # of options
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -156,7 +157,7 @@ def side_by_side(
         pool.shutdown(cancel_futures=True)
 
 
-def naming_only(options: Mapping[str, Any], own: Sequence[str], every: Iterable[Sequence[str]]) -> dict[str, Any]:
+def naming_only(options: Mapping[str, V], own: Sequence[str], every: Iterable[Sequence[str]]) -> dict[str, V]:
     """Options of a fit that name only parameters that the law or the vehicle has, or that none has: that is refused.
 
     Arguments:
@@ -165,7 +166,8 @@ def naming_only(options: Mapping[str, Any], own: Sequence[str], every: Iterable[
         every: those of each of the comparison.
     """
     paths = [*every]
-    return {name: _of(own, paths, value) if name in NAMED else value for name, value in options.items()}
+    named = {name: cast(V, _of(own, paths, cast(Names, value))) for name, value in options.items() if name in NAMED}
+    return {**options, **named}
 
 
 def _of(own: Sequence[str], every: Sequence[Sequence[str]], names: Names) -> Names:

@@ -147,7 +147,8 @@ def fit(
         tie: parameters that take the values of others, such as `{"terms.1.**": "terms.0.**"}`: one free value for each
             group (see `jaxdamp.parameters.free_parameters`).
         per_record: parameters with one value for each record, such as a friction that depends on the temperature; names
-            as in `freeze`. All other parameters are common to the records.
+            as in `freeze`. All other parameters are common to the records. A record that was not fitted is predicted
+            with their means, and begins as warm (`initial_rise`) as its first three cycles show, which are not scored.
         weighting: `"samples"`, equal weight of every sample; `"runs"`, equal weight of every record relative to its RMS
             force; or one standard deviation [N] for each record, of which only the ratios matter. `inf` leaves a record
             out of the fit; it is still scored.

@@ -20,7 +20,7 @@ from jaxdamp.identify.model import Model
 from jaxdamp.identify.predicting import Compared, Score, compared, errors
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.propagation import Evidence
-from jaxdamp.identify.start_temperatures import Warmed, warmed
+from jaxdamp.identify.start_temperatures import warmed
 from jaxdamp.identify.stated import start_paths
 from jaxdamp.parameters import get, with_values
 
@@ -66,29 +66,29 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
     fitted = np.flatnonzero(np.isfinite(problem.sigma))
     runs = [problem.runs[i] for i in fitted]
     groups = motions(runs)
-    own = set(problem.per_record)
-    whole = len(groups) >= FEWEST_MOTIONS and not in_time and own <= set(start_paths(result.model))
+    whole = len(groups) >= FEWEST_MOTIONS and not in_time
+    whole = whole and set(problem.per_record) <= set(start_paths(result.model))
     samples: list[Compared] = []
     left_out = _by_record(runs, groups) if whole else zip(*map(in_time_parts, runs), strict=True)
     for number, part in enumerate(left_out, 1):
         factor = _kept(problem, fitted, part)
         if np.all(factor) or not np.any(problem.used & (factor > 0)):
             continue
-        known = np.concatenate([run.velocity[~left] for run, left in zip(runs, part, strict=True)])
-        reached = [(run.velocity >= known.min()) & (run.velocity <= known.max()) for run in runs]
         names = [run.name if whole else f"{run.name}, part {number} of {PARTS}" for run in runs]
-        parts = zip(
-            map(int, fitted), names, (left & near for left, near in zip(part, reached, strict=True)), strict=True
-        )
-        models, told = _refitted(start, factor), [0] * len(problem.runs)
-        if whole and isinstance(models, list):  # each has a temperature of its own at its start
-            out = [int(i) for i, left in zip(fitted, part, strict=True) if left.all()]
-            for i, new in _warmed(models, out, result).items():
-                models[i], told[i] = new
+        parts = zip(map(int, fitted), names, _reached(runs, part), strict=True)
+        out = [int(i) for i, left in zip(fitted, part, strict=True) if left.all()] * whole
+        models, told = _predicting(_refitted(start, factor), out, result)
         samples += compared(models, problem.runs, problem.initial_state, parts, told)
     records = f"each of {len(runs)} records" if whole else f"each quarter of the record{'s' * (len(runs) > 1)}"
     same = ", all of one motion" * (len(groups) == 1)
     return _together(samples, f"{records} predicted by fits without it{same}")
+
+
+def _reached(runs: Sequence[BenchRun], part: Part) -> Part:
+    """The samples left out whose velocity the others reach."""
+    known = np.concatenate([run.velocity[~left] for run, left in zip(runs, part, strict=True)])
+    reached = [(run.velocity >= known.min()) & (run.velocity <= known.max()) for run in runs]
+    return tuple(left & near for left, near in zip(part, reached, strict=True))
 
 
 def on_records(result: FitResult, runs: Sequence[BenchRun]) -> HeldOut | None:
@@ -180,12 +180,22 @@ def anchored_at(evidence: Evidence) -> Problem:
     return problem.started_at(minimum.values)._replace(anchor=(minimum.values, weight))
 
 
-def _warmed(models: Sequence[Model], out: Sequence[int], result: FitResult) -> dict[int, Warmed]:
-    """The models of records left out, which begin as warm as their first cycles show, about the mean of the others."""
-    others, paths = [model for i, model in enumerate(models) if i not in out], start_paths(models[0])
+def _predicting(
+    models: Model | list[Model], out: Sequence[int], result: FitResult
+) -> tuple[Model | list[Model], list[int]]:
+    """The models without a value that records left out had for themselves, and the samples that told it instead.
+
+    Such a record begins as warm as its first cycles show, about the mean of the others.
+    """
+    told = [0] * len(result.runs)
+    if not isinstance(models, list) or not out:
+        return models, told
+    others, paths = [model for i, model in enumerate(models) if i not in out], result.own_starts
     mean = {path: np.mean([np.asarray(get(model, path)) for model in others]) for path in paths}
     how = (paths, result.rmse * result.inflation, result.initial_state)
-    return {i: warmed(with_values(models[i], mean), result.runs[i], *how) for i in out}
+    new = {i: warmed(with_values(models[i], mean), result.runs[i], *how) for i in out}
+    told = [new[i].told if i in new else 0 for i in range(len(models))]
+    return [new[i].model if i in new else model for i, model in enumerate(models)], told
 
 
 @one_thread()

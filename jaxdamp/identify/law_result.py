@@ -140,6 +140,11 @@ class FitResult(AbstractFitted, Fit):
         """Shares of the squared error over the records: shape, hysteresis, rest (`identify.error_shares`)."""
         return error_shares(self.models_of(self.runs)[0], self.runs, self.initial_state)
 
+    @property
+    def own_starts(self) -> list[str]:
+        """Paths of the temperatures at the start of a record, where each of the fitted ones had a value of its own."""
+        return unknown_starts(self.model, self.runs, () if self.evidence is None else self.evidence.problem.per_record)
+
     def models_of(self, runs: Sequence[BenchRun]) -> tuple[Model | list[Model], list[int]]:
         """The model of each record: a fitted one has its own values, a new one begins as warm as its cycles show."""
         common, told = self._model_of(runs), [0] * len(runs)
@@ -148,8 +153,7 @@ class FitResult(AbstractFitted, Fit):
         each = map(on_rig, self.record_laws, rigs, starts)
         own = {id(run): model for run, model in zip(self.runs, each, strict=False)}
         fitted = {id(run) for run in self.runs}
-        per_record = () if self.evidence is None else self.evidence.problem.per_record
-        paths = unknown_starts(self.model, self.runs, per_record)
+        paths = self.own_starts
         new = [i for i, run in enumerate(runs) if id(run) not in fitted and paths and initial_temperature(run) is None]
         if not own and not new:
             return common, told
