@@ -57,6 +57,7 @@ from jaxdamp.bench.sets import BenchSet, as_runs as as_runs
 from jaxdamp.bench.settings import (
     by_number as by_number,
     initial_temperature as initial_temperature,
+    number_and_unit as number_and_unit,
     settings_apart as settings_apart,
 )
 from jaxdamp.bench.units import ratio as ratio

@@ -99,14 +99,30 @@ def initial_temperature(run: BenchRun) -> float | None:
     stated = run.settings.get(TEMPERATURE)
     if stated is None:
         return None
-    match = _NUMBER.match(text := str(stated).strip())
-    by = conversion("temperature", text[match.end() :]) if match else None
-    if match is None or by is None:
+    value, unit = number_and_unit(stated)
+    by = None if value is None else conversion("temperature", unit)
+    if value is None or by is None:
         remedy = 'Write `settings={"temperature": "80 degC"}`, or K, or degF.'
         _checks.refuse("settings", f"state the temperature of {run.name!r} with its unit", repr(stated), remedy)
-    kelvin = float(by(np.asarray(float(match.group().replace(",", ".")))))
-    _checks.positive("temperature", kelvin, f"It is {text!r} of {run.name!r}.")
+    kelvin = float(by(np.asarray(value)))
+    _checks.positive("temperature", kelvin, f"It is {stated!r} of {run.name!r}.")
     return kelvin
+
+
+def number_and_unit(stated: float | int | str) -> tuple[float | None, str]:
+    """The number and the unit of a setting such as "20 bar"; no number where it does not begin with one.
+
+    Arguments:
+        stated: the value of a setting; a plain number has no unit.
+
+    >>> number_and_unit("20 bar"), number_and_unit(3), number_and_unit("soft")
+    ((20.0, 'bar'), (3.0, ''), (None, 'soft'))
+    """
+    text = str(stated).strip()
+    match = re.match(rf"{_NUMBER.pattern}(?:[eE][+-]?\d+)?", text)
+    if match is None:
+        return None, text
+    return float(match.group().replace(",", ".")), text[match.end() :].strip()
 
 
 _EDGE = r"(?<![A-Za-z\d.])"

@@ -24,6 +24,7 @@ from jaxdamp.identify.blending import off_span
 from jaxdamp.identify.contradicting import contradicting
 from jaxdamp.identify.estimates import Estimate
 from jaxdamp.identify.estimating import Estimates, estimate, on_misfit
+from jaxdamp.identify.gas import gas_in_words
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.left_out import left_out
 from jaxdamp.identify.model import (
@@ -81,8 +82,9 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     on_records = (*notes_on(model, problem.fitted_to), *off_span(model, problem.fitted_to, problem.initial_state))
     effects = left_out(problem, best)
     on_rest = on_misfit(noise, estimates.estimates, bool(effects))
-    main = (*notes, *on_records, *effects, *estimates.summary, *on_rest)
-    notes += [*on_records, *estimates.notes, *on_rest, *effects]
+    gas = gas_in_words(model, problem.fitted_to, estimates.estimates, estimates.covariance)
+    main = (*notes, *on_records, *effects, *gas, *estimates.summary, *on_rest)
+    notes += [*on_records, *gas, *estimates.notes, *on_rest, *effects]
     return FitResult(
         law=with_standard_errors(law, _errors_of_law(model, estimates.estimates)),
         runs=problem.runs,

@@ -30,7 +30,7 @@ from jaxdamp.identify.model import (
 )
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.starting import Start, frozen_by
-from jaxdamp.identify.stated import start_paths, stated_values
+from jaxdamp.identify.stated import stated_parameters, stated_values, with_stated
 from jaxdamp.identify.traces import batches, owners, places
 from jaxdamp.parameters import free_parameters, match_paths, matching, name_patterns, parameters, with_values
 
@@ -102,9 +102,10 @@ def prepare(
         absent = [*absent, *unfitted]
     _refuse_two_readings(model, freeze=freeze, per_record=per_record, over=over, bounds=bounds, priors=priors, tie=tie)
     stated = stated_values(model, runs)
+    model = with_stated(model, stated_parameters(model, fitted_to))
     own = _per_record(model, per_record, sigma, absent, stated)
     frozen = [*name_patterns("freeze", freeze), *frozen_by(law), *absent, *not_chosen(model, over, "rig.", STARTS)]
-    frozen += [path for path in start_paths(model) if path in stated]
+    frozen += [p.path for p in parameters(model) if p.path in stated]
     free = free_parameters(_spread(model, own, len(runs)), freeze=frozen, bounds=bounds, tie=tie)
     _checks.finite("law", free.values)
     residuals, ranges = batches(model, runs, sigma, samples_per_cycle, own, initial_state)
@@ -166,7 +167,10 @@ def not_chosen(model: Model | VehicleTest, over: Sequence[str] | None, *beside: 
 def records_in_words(problem: Problem) -> str:
     """What of the records is left out, and how they start, where that differs from the usual; else empty."""
     model, runs = with_means(problem.free.tree, problem.per_record), problem.fitted_to
-    parts = [] if is_memoryless(model) else [starts_in_words(runs, problem.initial_state)]
+    stated = stated_parameters(model, runs).items()
+    spans = [f"{path} {np.min(values):.4g} to {np.max(values):.4g}" for path, values in stated]
+    parts = [f"stated by the records: {', '.join(spans)}"] * bool(spans)
+    parts += [] if is_memoryless(model) else [starts_in_words(runs, problem.initial_state)]
     if not can_rest(model):
         resting = [(run, moving_samples(run)) for run in runs]
         resting = [(run, moving) for run, moving in resting if moving.stop - moving.start < len(run)]
