@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, laws_inside
@@ -52,24 +52,28 @@ def gas_in_words(
         covariance: of the same.
     """
     law, inside = law_of(model), "" if isinstance(model, AbstractDamper) else "law."
-    charges = gas_charges(law)
-    if not charges or charged_apart(law, runs):
+    gas = tuple(inside + prefix for prefix, _ in gas_charges(law))
+    if not gas or charged_apart(law, runs):
         return []
-    gas = tuple(inside + prefix for prefix, _ in charges)
     constant = [f"{inside}{prefix}{name}" for prefix, part in laws_inside(law) for name in part.constant_forces()]
     constant += ["rig.force_offset", "rig.gas_force"] * (rig_of(model) is not None)
-    error = np.sqrt(np.diag(covariance))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        alike = np.abs(covariance / np.outer(error, error)) > ALIKE
     names = [e.name for e in estimates]
-    apart = [i for i, name in enumerate(names) if name.startswith(gas)]
-    beside = [*apart, *(i for i, name in enumerate(names) if name in constant)]
-    mixed = [i for i in beside if any(alike[i, k] for k in beside if k != i and (i in apart or k in apart))]
-    if not mixed:
+    of_gas = np.array([name.startswith(gas) for name in names], bool)
+    beside = of_gas | np.isin(names, constant)
+    mixed = np.any(_alike(covariance) & np.outer(beside, beside) & (of_gas[:, None] | of_gas), axis=0)
+    if not mixed.any():
         return []
     pressures = [name.removeprefix(inside) for name in names if name.startswith(gas) and name.endswith("pressure")]
     return [
-        f"These records, at one gas pressure, hardly tell {', '.join(names[i] for i in mixed)} apart: the gas pushes"
+        f"These records, at one gas pressure, hardly tell {', '.join(np.array(names)[mixed])} apart: the gas pushes"
         f" with pressure times area. Freeze what is known, or add records at other pressures that state them,"
         f' `settings={{"{(*pressures, "pressure")[0]}": "20 bar"}}` (absolute).'
     ]
+
+
+def _alike(covariance: Float[np.ndarray, "free free"]) -> Bool[np.ndarray, "free free"]:
+    """Which numbers are hardly told from which others."""
+    error = np.sqrt(np.diag(covariance))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        alike = np.abs(covariance / np.outer(error, error)) > ALIKE
+    return alike & ~np.eye(len(error), dtype=bool)

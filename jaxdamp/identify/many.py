@@ -24,10 +24,11 @@ from jaxdamp.identify.lanes import Fitted, LanePriors, Lanes, Products, by_round
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import Machine, absent_paths, started_on
 from jaxdamp.identify.many_result import ManyFits
-from jaxdamp.identify.model import initial_state_for, on_rig, rig_of
+from jaxdamp.identify.model import Model, initial_state_for, on_rig, rig_of
 from jaxdamp.identify.preparing import weights
 from jaxdamp.identify.several import other_starts
 from jaxdamp.identify.starting import Start
+from jaxdamp.identify.stated import start_paths, stated_parameters, stated_values
 from jaxdamp.parameters import Coordinates, FreeParameters, free_parameters
 from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, SearchLanes, least_squares_on_host
 
@@ -119,7 +120,8 @@ def fit_many(
     if bad_records != "keep" and initial_state != "estimated":
         for name, runs in zip(names, records, strict=True):
             refuse_contradicting(contradicting(model, runs), f"dampers[{name!r}]")
-    free = free_parameters(model, freeze=[*freeze, *absent_paths(machine), *held], bounds=bounds, tie=tie)
+    begins = _begins(model, records)
+    free = free_parameters(model, freeze=[*freeze, *absent_paths(machine), *held, *begins], bounds=bounds, tie=tie)
     _checks.finite("law", free.values)
     depends = dependence(free, shared, stated, len(names))
     how = {"rig": rig, "freeze": freeze, "bounds": bounds, "tie": tie, "weighting": weighting, "loss": loss}
@@ -139,6 +141,16 @@ def fit_many(
         noise = FIRST_NOISE * lanes.levels() / np.sqrt(lanes.samples())
         lanes = lanes._replace(priors=LanePriors(_once(priors_on(free, priors, 1.0)[0], free, depends), noise))
     return many(dependence=depends, **_side_by_side(lanes, records, depends, loss, starts, max_steps))
+
+
+def _begins(model: Model, records: Sequence[Sequence[BenchRun]]) -> list[str]:
+    """Paths of the starts that the records state by their temperature; parameters of the law are refused."""
+    runs = [run for of_damper in records for run in of_damper]
+    if paths := list(stated_parameters(model, runs)):
+        remedy = "Fit such dampers one by one, with `fit`, or leave this setting out."
+        _checks.refuse("dampers", "have records that state no parameter of the law", ", ".join(paths), remedy)
+    stated = stated_values(model, runs)
+    return [path for path in start_paths(model) if path in stated]
 
 
 def _side_by_side(

@@ -109,6 +109,8 @@ def test_records_that_do_not_state_it_well_are_refused(runs):
             fit(BEGIN, wrong, freeze=HELD, starts=1)
     with pytest.raises(ValueError, match=r"name numbers that the records do not state, but is terms\.1\.pressure"):
         fit(BEGIN, runs, freeze=HELD, per_record=["pressure"], starts=1)
+    with pytest.raises(ValueError, match=r"records that state no parameter of the law, but is terms\.1\.pressure"):
+        fit(BEGIN, {"A": runs[:2], "B": runs[2:4]}, freeze=HELD)
     other = dataclasses.replace(runs[1], force=1.3 * runs[1].force, name="another")
     with pytest.raises(ValueError, match=r"be records that one law can follow, but is .*fast 0 and another"):
         fit(BEGIN, [*runs, other], freeze=HELD, starts=1)

@@ -111,6 +111,8 @@ def test_records_that_state_their_temperature_begin_with_it(runs, hot):
     assert result.score(at(62.0, hot))[1] < 1.05 * NOISE < 2.0 * NOISE < result.score(at(20.0, hot))[1]
     assert result.score(hot)[1] < 1.1 * NOISE  # by its first cycles
     assert cross_validate({"heated": BEGIN}, stated, rig=None, **HOW).rmse("heated") < 1.1 * NOISE
+    many = fit(BEGIN, {"A": stated[:2], "B": stated[2:]}, **HOW)
+    assert not [name for name in many.free.names if "rise" in name] and max(many.rmse) < 1.1 * NOISE
     with pytest.raises(ValueError, match="not state, but is initial_rise"):
         fit(BEGIN, stated, per_record=["initial_rise"], **HOW)
     with pytest.raises(ValueError, match=rf"all state their temperature, but is without one: {runs[1].name}"):
