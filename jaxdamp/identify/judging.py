@@ -194,7 +194,9 @@ def _driving(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
         return []
     velocity = np.concatenate([run.velocity for run in runs])
     order = np.argsort(velocity, kind="stable")
-    velocity, force = velocity[order], np.concatenate(predict_runs(law, runs))[order]
+    still = [dataclasses.replace(run, velocity=np.zeros(len(run))) for run in runs]  # springs and gas are no damping
+    forces = np.concatenate(predict_runs(law, runs)) - np.concatenate(predict_runs(law, still))
+    velocity, force = velocity[order], forces[order]
     at = velocity[drives_motion(velocity, force)]
     if not at.size:
         return []
