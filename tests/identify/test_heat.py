@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from jaxdamp.bench import BenchRun, SineTest, VirtualDyno, initial_temperature
+from jaxdamp.bench import BenchRun, SineTest, VirtualDyno, initial_temperature, read
 from jaxdamp.dampers import Bilinear, CoulombFriction, Heated, Linear, TemperatureScaled
 from jaxdamp.identify import compare, cross_validate, fit
 from jaxdamp.identify.held_out import on_records
@@ -129,6 +129,16 @@ def test_a_stated_temperature_has_a_unit(text, kelvin, hot):
         with pytest.raises(ValueError, match=r"temperature of .* with its unit, but is .*80 degC"):
             fit(BEGIN, run, **HOW)
     assert fit(Linear(1000.0), run).fit_percent > 50.0  # it says nothing of a law that follows no temperature
+
+
+def test_settings_with_units_are_read_from_manifests_and_names(tmp_path, hot):
+    hot.to_csv(tmp_path / "run_80degC_20bar.csv")
+    (tmp_path / "jaxdamp.toml").write_text('settings = "run_{temperature}_{pressure}"')
+    run = read(tmp_path)[0]
+    assert run.settings == {"temperature": "80degC", "pressure": "20bar"}
+    np.testing.assert_allclose(initial_temperature(run), 353.15)
+    again = read(run.to_csv(tmp_path / "again.csv"), manifest=False)[0]
+    np.testing.assert_allclose(initial_temperature(again), 353.15)
 
 
 def test_a_scaled_law_takes_one_temperature_a_record_a_channel_or_its_own():
