@@ -29,6 +29,7 @@ PARTS = 4  # into which records, or the time of each record, are divided
 FEWEST_MOTIONS = 3  # that differ, for whole records to be left out
 ALIKE = 0.02  # relative difference of frequency and largest velocity of records of the same motion
 LEAST_CHANGE = 0.5  # of what changes the force by its RMS: numbers are never held more firmly
+LEAST_UNREACHED = 0.05  # of the samples of a record, beyond the velocities of all others, which then count
 SLICES = 5  # in which a part of a record of few cycles is spread over it
 REFIT_STEPS = 12  # of each refit at most, from the minimum of all records
 
@@ -50,8 +51,9 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
     Records of three motions or more are left out in up to four groups, records of the same motion together. Otherwise
     the quarters of the records in time are left out; of records shorter than four cycles, every fourth of 20 slices.
 
-    Only velocities that the other parts reach are compared: no law knows its curve beyond. A number that the other
-    parts do not determine keeps its value of the fit of all records.
+    A part is predicted at velocities that the other parts reach: no law knows its curve beyond. Where 5 % of a record
+    or more are beyond the velocities of all others, the fit of all is judged on them, since its error there counts
+    too. A number that the other parts do not determine keeps its value of the fit of all records.
 
     Arguments:
         result: of `fit`.
@@ -66,22 +68,30 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
     fitted = np.flatnonzero(np.isfinite(problem.sigma))
     runs = [problem.runs[i] for i in fitted]
     groups = motions(runs)
-    whole = len(groups) >= FEWEST_MOTIONS and not in_time
-    whole = whole and set(problem.per_record) <= set(start_paths(result.model))
+    whole = not in_time and _as_wholes(result, problem, groups)
     samples: list[Compared] = []
+    unreached = [np.ones(len(run), bool) for run in runs]
     left_out = _by_record(runs, groups) if whole else zip(*map(in_time_parts, runs), strict=True)
     for number, part in enumerate(left_out, 1):
         factor = _kept(problem, fitted, part)
         if np.all(factor) or not np.any(problem.used & (factor > 0)):
             continue
+        near = _reached(runs, part)
+        unreached = [at & ~reached for at, reached in zip(unreached, near, strict=True)]
         names = [run.name if whole else f"{run.name}, part {number} of {PARTS}" for run in runs]
-        parts = zip(map(int, fitted), names, _reached(runs, part), strict=True)
-        out = [int(i) for i, left in zip(fitted, part, strict=True) if left.all()] * whole
-        models, told = _predicting(_refitted(start, factor), out, result)
+        parts = zip(map(int, fitted), names, near, strict=True)
+        models, told = _predicting(_refitted(start, factor), fitted, part, result)
         samples += compared(models, problem.runs, problem.initial_state, parts, told)
-    records = f"each of {len(runs)} records" if whole else f"each quarter of the record{'s' * (len(runs) > 1)}"
-    same = ", all of one motion" * (len(groups) == 1)
-    return _together(samples, f"{records} predicted by fits without it{same}")
+    beyond = _beyond(result, fitted, unreached) if samples else []
+    words = f"each of {len(runs)} records" if whole else f"each quarter of the record{'s' * (len(runs) > 1)}"
+    words += " predicted by fits without it" + ", all of one motion" * (len(groups) == 1)
+    words += ", velocities that no other reaches by the fit of all" * bool(beyond)
+    return _together([*samples, *beyond], words)
+
+
+def _as_wholes(result: FitResult, problem: Problem, groups: Sequence[Sequence[int]]) -> bool:
+    """Whether whole records can be left out: of several motions, with no own number but how warm they begin."""
+    return len(groups) >= FEWEST_MOTIONS and set(problem.per_record) <= set(start_paths(result.model))
 
 
 def _reached(runs: Sequence[BenchRun], part: Part) -> Part:
@@ -89,6 +99,13 @@ def _reached(runs: Sequence[BenchRun], part: Part) -> Part:
     known = np.concatenate([run.velocity[~left] for run, left in zip(runs, part, strict=True)])
     reached = [(run.velocity >= known.min()) & (run.velocity <= known.max()) for run in runs]
     return tuple(left & near for left, near in zip(part, reached, strict=True))
+
+
+def _beyond(result: FitResult, fitted: np.ndarray, unreached: Sequence[np.ndarray]) -> list[Compared]:
+    """The samples of records that reach far beyond the velocities of all others, by the fit of all."""
+    names = [f"{result.runs[i].name}, beyond the others" for i in fitted]
+    parts = [each for each in zip(map(int, fitted), names, unreached, strict=True) if each[2].mean() >= LEAST_UNREACHED]
+    return compared(result.models_of(result.runs)[0], result.runs, result.initial_state, parts) if parts else []
 
 
 def on_records(result: FitResult, runs: Sequence[BenchRun]) -> HeldOut | None:
@@ -181,16 +198,17 @@ def anchored_at(evidence: Evidence) -> Problem:
 
 
 def _predicting(
-    models: Model | list[Model], out: Sequence[int], result: FitResult
+    models: Model | list[Model], fitted: np.ndarray, part: Part, result: FitResult
 ) -> tuple[Model | list[Model], list[int]]:
     """The models without a value that records left out had for themselves, and the samples that told it instead.
 
     Such a record begins as warm as its first cycles show, about the mean of the others.
     """
-    told = [0] * len(result.runs)
-    if not isinstance(models, list) or not out:
-        return models, told
-    others, paths = [model for i, model in enumerate(models) if i not in out], result.own_starts
+    out = [int(i) for i, left in zip(fitted, part, strict=True) if left.all()]
+    paths = result.own_starts
+    if not isinstance(models, list) or not out or not paths:
+        return models, [0] * len(result.runs)
+    others = [model for i, model in enumerate(models) if i not in out]
     mean = {path: np.mean([np.asarray(get(model, path)) for model in others]) for path in paths}
     how = (paths, result.rmse * result.inflation, result.initial_state)
     new = {i: warmed(with_values(models[i], mean), result.runs[i], *how) for i in out}
