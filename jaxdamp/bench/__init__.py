@@ -55,7 +55,12 @@ from jaxdamp.bench.ride_record import RideRecord
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sensors import Sensors
 from jaxdamp.bench.sets import BenchSet, as_runs as as_runs
-from jaxdamp.bench.settings import by_number as by_number, settings_apart as settings_apart
+from jaxdamp.bench.settings import (
+    by_number as by_number,
+    initial_temperature as initial_temperature,
+    number_and_unit as number_and_unit,
+    settings_apart as settings_apart,
+)
 from jaxdamp.bench.units import ratio as ratio
 from jaxdamp.bench.velocity import estimate_velocity
 from jaxdamp.bench.virtual_dyno import VirtualDyno

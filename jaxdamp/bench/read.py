@@ -72,8 +72,8 @@ def read(
         command: what was set on the damper and held, such as a coil current: one number for all files, a number for
             each record by name or pattern, such as `{"*_0.5A": 0.5, "*_1.0A": 1.0}`, or the name of a setting.
             Without it, a column of a coil current or voltage is the command; `BenchRun.command_channel` if it varies.
-        settings: what else is known of the records: pattern to settings, `{"hot_*": {"temperature": 80}}`, or a pattern
-            with names in braces, `"*_{current}A"`, that takes the settings from the names of the records.
+        settings: what else is known of the records: pattern to settings, `{"hot_*": {"temperature": "80 degC"}}`, or a
+            pattern with names in braces, `"*_{current}A"`, that takes the settings from the names of the records.
         manifest: a TOML file with these arguments; True takes `jaxdamp.toml` of the folder that is read, and a note
             says so; False takes none. What is given in the call wins.
         readers: suffix to function that reads such files, beside or instead of `READERS` (docs/own_reader.md).

@@ -58,7 +58,8 @@ class BenchRun:
             choice; for laws that take a command (`dampers.with_command`).
         command_channel: what was set instead if it varies during the record, as measured, shape (time,).
         command_unit: unit of this channel: "A", "V" or "%".
-        settings: what else is known of the record, by name: clicks, temperature, the test.
+        settings: what else is known, by name: clicks, the test, the temperature at the start ("80 degC"), a parameter
+            of the law with its unit, such as `{"gas.pressure": "20 bar"}`, which fits take as known for this record.
         source: the file, or what else the record comes from.
         notes: sentences on what was done to the data.
         stroke_is_integrated: the stroke was integrated from the velocity, so that its zero is the middle of the motion

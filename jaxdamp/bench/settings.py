@@ -4,10 +4,15 @@ import itertools
 import re
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from jaxdamp import _checks
 from jaxdamp.bench.contradictions import contradictions, same_motion
 from jaxdamp.bench.runs import BenchRun
+from jaxdamp.bench.units import conversion
 
+
+TEMPERATURE = "temperature"  # the setting that states how warm the damper is when a record begins
 
 Settings = Mapping[str, float | int | str]
 _FIELD = re.compile(r"\{(\w*)\}")
@@ -34,7 +39,7 @@ def settings_by_name(names: Sequence[str], given: str | Mapping[str, Settings] |
     if given is None:
         return settings
     table = {given: {}} if isinstance(given, str) else given
-    must = 'map patterns to settings, such as {"*_hot": {"temperature": 80}}, or be a pattern such as "*_{current}A"'
+    must = 'map patterns to settings, {"*_hot": {"temperature": "80 degC"}}, or be a pattern such as "*_{current}A"'
     _checks.instance("settings", table, Mapping, must)
     for pattern, values in table.items():
         _checks.instance("settings", values, Mapping, must)
@@ -72,6 +77,52 @@ def _add(settings: dict, more: Settings, name: str) -> None:
         if settings.setdefault(key, value) != value:
             must = f"give each setting one value, as {key} of {name!r}"
             _checks.refuse("settings", must, f"{settings[key]!r} and {value!r}")
+
+
+def initial_temperature(run: BenchRun) -> float | None:
+    """Temperature [K] of the damper at the first sample: by its channel, or by the setting `temperature` with a unit.
+
+    Arguments:
+        run: a record, such as one with the setting `{"temperature": "80 degC"}`.
+
+    Raises:
+        ValueError: a setting without a unit of temperature.
+
+    >>> import dataclasses
+    >>> t = np.arange(200) / 100
+    >>> run = BenchRun.from_arrays("hot", t, np.sin(9 * t), np.cos(9 * t))
+    >>> initial_temperature(dataclasses.replace(run, settings={"temperature": "80 degC"}))
+    353.15
+    """
+    if run.temperature is not None:
+        return float(run.temperature[0])
+    stated = run.settings.get(TEMPERATURE)
+    if stated is None:
+        return None
+    value, unit = number_and_unit(stated)
+    by = None if value is None else conversion("temperature", unit)
+    if value is None or by is None:
+        remedy = 'Write `settings={"temperature": "80 degC"}`, or K, or degF.'
+        _checks.refuse("settings", f"state the temperature of {run.name!r} with its unit", repr(stated), remedy)
+    kelvin = float(by(np.asarray(value)))
+    _checks.positive("temperature", kelvin, f"It is {stated!r} of {run.name!r}.")
+    return kelvin
+
+
+def number_and_unit(stated: float | int | str) -> tuple[float | None, str]:
+    """The number and the unit of a setting such as "20 bar"; no number where it does not begin with one.
+
+    Arguments:
+        stated: the value of a setting; a plain number has no unit.
+
+    >>> number_and_unit("20 bar"), number_and_unit(3), number_and_unit("soft")
+    ((20.0, 'bar'), (3.0, ''), (None, 'soft'))
+    """
+    text = str(stated).strip()
+    match = re.match(rf"{_NUMBER.pattern}(?:[eE][+-]?\d+)?", text)
+    if match is None:
+        return None, text
+    return float(match.group().replace(",", ".")), text[match.end() :].strip()
 
 
 _EDGE = r"(?<![A-Za-z\d.])"

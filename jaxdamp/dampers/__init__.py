@@ -54,6 +54,7 @@ from jaxdamp.dampers.inside import (
     keeps_conditions as keeps_conditions,
     margins as margins,
     require_finite_force as require_finite_force,
+    values_at_start as values_at_start,
 )
 from jaxdamp.dampers.karadayi_masada import KaradayiMasada
 from jaxdamp.dampers.lag import Lag

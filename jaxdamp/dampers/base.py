@@ -129,6 +129,11 @@ class AbstractDamper(Module):
         known = [law.at_temperature(temperature) for law in self.inner_laws()]
         return eqx.tree_at(lambda law: law.inner_laws(), self, known)
 
+    def values_at_start(self, temperature: ScalarLike) -> dict[str, ScalarLike]:
+        """Own numbers that a temperature [K] at the first instant of a motion sets, by name; none by default."""
+        del temperature
+        return {}
+
     def side_by_side(self) -> tuple["AbstractDamper", ...]:
         """Laws whose forces add up to the force of this law; the law itself if it is no sum."""
         return (self,)

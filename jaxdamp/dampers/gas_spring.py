@@ -40,8 +40,9 @@ class GasSpring(AbstractStateless):
     (adiabatic). The gas warms with the damper: p₀ is the pressure at the temperature of the test, in proportion to it
     [K]. Valid while V₀ + A x > 0.05 V₀ (see `gas_pressure`).
 
-    Tests at one stroke position determine p₀ A only; V₀ and n follow from a slow test over the whole stroke, and only
-    as n/V₀ if A x is small compared with V₀.
+    Tests at one pressure and stroke position determine p₀ A only; V₀ and n follow from a slow test over the whole
+    stroke, and only as n/V₀ if A x is small compared with V₀. Records at several pressures that state theirs
+    (`settings={"pressure": "20 bar"}`) determine A.
 
     >>> law = GasSpring(pressure=2e6, volume=6e-5, rod_area=1e-4, exponent=1.3)
     >>> [round(float(law.force(x, 0.0, law.initial_state())), 2) for x in (0.0, 0.05, -0.05)]

@@ -45,8 +45,9 @@ class Heated(AbstractWrapper):
     freeze `cooling_time` and `initial_rise`.
 
     Records without a temperature determine only κ/C and s/C; the heat capacity is therefore a setting, by default that
-    of 2 kg of steel, and then ϑ is an estimate. Records that begin warm have their own start:
-    `fit(..., per_record=["initial_rise"])`.
+    of 2 kg of steel, and then ϑ is an estimate. Records that begin warm have their own start: stated by their setting
+    `temperature` ("60 degC"), or fitted, `fit(..., per_record=["initial_rise"])`; then a new record is predicted from
+    the start that its first cycles show. The heat flows into a room at T₀.
 
     State: ϑ [K], then the states of the law. The step takes the power as the mean of both ends, second order.
 
@@ -91,6 +92,10 @@ class Heated(AbstractWrapper):
         """The law with a known temperature [K] in place of that which its losses give."""
         rise = temperature - self.reference_temperature
         return AtRise(self.law.at_temperature(temperature), rise, self.sensitivity, self.static_force_slope)
+
+    def values_at_start(self, temperature: ScalarLike) -> dict[str, ScalarLike]:
+        """ϑ at the start, T − T₀."""
+        return {"initial_rise": temperature - self.reference_temperature}
 
     def motion_inside(self, motion: Motion) -> list[tuple[AbstractDamper, Motion]]:
         """The same motion; the force inside is not known."""

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from jaxdamp import _checks
+from jaxdamp._types import ScalarLike
 from jaxdamp.dampers.base import AbstractDamper, laws_inside
 from jaxdamp.parameters import declared_inside
 
@@ -18,6 +19,17 @@ def command_paths(tree: object, prefix: str = "") -> list[str]:
         prefix: put before each path.
     """
     return [path for path, _, has in declared_inside(tree, prefix) if has.get("setting", {}).get("command")]
+
+
+def values_at_start(tree: object, temperature: ScalarLike) -> dict[str, ScalarLike]:
+    """The numbers that a temperature at the first instant of a motion sets, by path, in all laws inside.
+
+    Arguments:
+        tree: a law, a vehicle or another module.
+        temperature: of the damper [K].
+    """
+    inside = [(path, law.values_at_start(temperature)) for path, law in laws_inside(tree)]
+    return {path + name: value for path, values in inside for name, value in values.items()}
 
 
 def coverage(law: AbstractDamper) -> str:

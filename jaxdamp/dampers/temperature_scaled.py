@@ -21,9 +21,9 @@ class TemperatureScaled(AbstractWrapper):
     which decreases faster and nonlinearly. The linear approximation is valid for about 40 K around T₀. The factor must
     be positive (κ (T − T₀) < 1), otherwise the law would add energy to the motion; the constructor refuses this.
 
-    Fits take T from the temperature channel of the records, sample by sample, and `respond` takes it as an argument.
-    The stated temperature is for motions where none was measured; records of which only some have the channel are
-    refused.
+    Fits take T from the temperature channel of the records, sample by sample, or from their setting `temperature`
+    ("60 degC"), and `respond` takes it as an argument. The stated temperature is for motions where none was measured;
+    records of which only some have the channel, or the setting, are refused.
 
     Scale only the oil forces: gas pressure increases with temperature, and springs do not depend on it, so write
     `SeriesSpring(TemperatureScaled(law, ...), ...)` and `TemperatureScaled(law, ...) + GasSpring(...)`. κ is
@@ -55,6 +55,10 @@ class TemperatureScaled(AbstractWrapper):
         """This law at a known oil temperature [K]."""
         law = (self.law.at_temperature(temperature), temperature)
         return eqx.tree_at(lambda whole: (whole.law, whole.temperature), self, law)
+
+    def values_at_start(self, temperature: ScalarLike) -> dict[str, ScalarLike]:
+        """T, which stays."""
+        return {"temperature": temperature}
 
     def is_linear_in_law(self) -> bool:
         """A factor is linear."""

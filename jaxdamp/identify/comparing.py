@@ -13,17 +13,18 @@ from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Figure
 from jaxdamp.bench import BenchRun, RideRecord, as_runs, usable
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.identify.comparison import AbstractComparison, side_by_side
+from jaxdamp.identify.comparison import NAMED, AbstractComparison, naming_only, side_by_side
 from jaxdamp.identify.fitting import NUMERICAL, fit
 from jaxdamp.identify.held_out import HeldOut, on_records, without_parts
 from jaxdamp.identify.law_result import FitResult
-from jaxdamp.identify.machine import OFFSET, Machine
+from jaxdamp.identify.machine import OFFSET, Machine, absent_paths, started_machine
+from jaxdamp.identify.model import on_rig
 from jaxdamp.identify.reducing import reduced
 from jaxdamp.identify.rungs import Failure, Rung, ladder_table, verdict
 from jaxdamp.identify.scheduling import fit_scheduled, settings_stated
-from jaxdamp.identify.starting import AbstractTrainedStart, Start, check_starts, frozen_by
+from jaxdamp.identify.starting import AbstractTrainedStart, Start, check_starts, frozen_by, started
 from jaxdamp.identify.vehicle_comparing import VehicleComparison, compare_vehicles
-from jaxdamp.parameters import name_patterns
+from jaxdamp.parameters import name_patterns, parameters
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -147,7 +148,7 @@ def compare(
             starts are carried over from neighbouring settings, and the best law is also scored between settings.
         progress: called with each name before its fit; a line in the terminal if it is left out.
         bad_records: "refuse", "leave_out" or "keep" records with an error, as in `fit`; those held out are checked too.
-        options: passed on to `fit`.
+        options: passed on to `fit`. Names of parameters that only some of the laws have count for these laws.
 
     Raises:
         ValueError: no laws, or none that could be fitted; a record with an error; with `scheduled`, records of one
@@ -211,17 +212,21 @@ def fit_each(
     """
     if scheduled:
         runs = settings_stated(runs)
+    named = {"freeze": name_patterns("freeze", freeze), **options}
+    naming = any(named.get(option) for option in NAMED)
+    known = {name: _paths(law, runs, rig) for name, law in laws.items()} if naming else {}
 
     def fitted(name: str, start: Start, held: tuple[str, ...] = ()) -> Rung | Failure:
-        frozen = (*name_patterns("freeze", freeze), *held)
-        inputs = ("law", name, start, tuple(runs), tuple(held_out), scheduled, rig, frozen, options)
-        return piece(inputs, lambda: outcome(name, start, frozen))
+        own = naming_only(named, _paths(start, runs, rig), known.values()) if known else named
+        own = {**own, "rig": rig, "freeze": (*own["freeze"], *held)}
+        return piece(
+            ("law", name, start, tuple(runs), tuple(held_out), scheduled, own), lambda: outcome(name, start, own)
+        )
 
-    def outcome(name: str, start: Start, frozen: tuple[str, ...]) -> Rung | Failure:
-        how = {"rig": rig, "freeze": frozen}
+    def outcome(name: str, start: Start, how: dict[str, Any]) -> Rung | Failure:
         try:
-            by_setting = fit_scheduled(start, runs, progress=lambda text: None, **how, **options) if scheduled else None
-            result = by_setting.result if by_setting else fit(start, runs, **how, **options)
+            by_setting = fit_scheduled(start, runs, progress=lambda text: None, **how) if scheduled else None
+            result = by_setting.result if by_setting else fit(start, runs, **how)
             judged = _judged(start, result, held_out, scheduled)
         except NUMERICAL as error:
             return Failure(name, str(error))
@@ -239,6 +244,17 @@ def fit_each(
         yield one
     if rungs and not scheduled:
         yield from reduced(rungs, simpler, progress)
+
+
+def _paths(start: Start, runs: Sequence[BenchRun], rig: Machine) -> list[str]:
+    """Paths of the parameters of a law on its machine; none where it cannot be started, which its fit then says."""
+    try:
+        law = start.untrained(runs) if isinstance(start, AbstractTrainedStart) else started(start, runs)
+        machine = started_machine(rig, runs)
+        left_out = absent_paths(machine)
+        return [p.path for p in parameters(on_rig(law, machine)) if p.path not in left_out]
+    except NUMERICAL:
+        return []
 
 
 def _judged(start: Start, result: FitResult, held_out: Sequence[BenchRun], scheduled: bool) -> HeldOut | None:

@@ -4,9 +4,9 @@ import dataclasses
 import functools
 import os
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import ClassVar, Generic, TypeVar
+from typing import ClassVar, Generic, TypeVar, cast
 
 import jax
 import jax.numpy as jnp
@@ -17,15 +17,19 @@ from jaxdamp._tables import Contents
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.recommending import Candidate, Recommendation, recommendation
 from jaxdamp.identify.rungs import Failure
+from jaxdamp.parameters import matching
 
 
+NAMED = ("over", "freeze", "per_record", "bounds", "priors", "tie")  # options that name parameters
 MOST_THREADS = 4  # fits side by side: more of them wait for Python's lock
 
 R = TypeVar("R", bound=Candidate)
 D = TypeVar("D", BenchRun, RideRecord)
 C = TypeVar("C", bound="AbstractComparison")  # not `Self`, which run-time type checks refuse
+Names = str | Sequence[str] | Mapping[str, object] | None
 Start = TypeVar("Start")
 Outcome = TypeVar("Outcome")
+V = TypeVar("V")  # of options
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -151,3 +155,29 @@ def side_by_side(
             yield outcome.result()
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def naming_only(options: Mapping[str, V], own: Sequence[str], every: Iterable[Sequence[str]]) -> dict[str, V]:
+    """Options of a fit that name only parameters that the law or the vehicle has, or that none has: that is refused.
+
+    Arguments:
+        options: of the comparison.
+        own: paths of the parameters of this law or vehicle.
+        every: those of each of the comparison.
+    """
+    paths = [*every]
+    named = {name: cast(V, _of(own, paths, cast(Names, value))) for name, value in options.items() if name in NAMED}
+    return {**options, **named}
+
+
+def _of(own: Sequence[str], every: Sequence[Sequence[str]], names: Names) -> Names:
+    """The names of parameters that this one has, or none of the others, which its fit then refuses."""
+    if names is None:
+        return None
+
+    def counts(name: str) -> bool:
+        return bool(matching(own, name)) or not any(matching(paths, name) for paths in every)
+
+    if isinstance(names, Mapping):
+        return {name: value for name, value in names.items() if counts(name)}
+    return [name for name in ([names] if isinstance(names, str) else names) if counts(name)]

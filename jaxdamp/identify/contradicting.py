@@ -3,15 +3,17 @@
 from collections.abc import Sequence
 
 from jaxdamp import _checks
-from jaxdamp.bench import BenchRun, Contradiction, contradictions, pairs_in_words
+from jaxdamp.bench import BenchRun, Contradiction, contradictions, initial_temperature, pairs_in_words
 from jaxdamp.dampers import takes_command
 from jaxdamp.identify.model import Model, law_of, rig_of
+from jaxdamp.identify.stated import stated_parameters
 
 
 def contradicting(model: Model, runs: Sequence[BenchRun]) -> list[Contradiction]:
     """Records with the same motion but different forces, where the records state nothing else that the model follows.
 
-    A law may take a command; a law or a machine may depend on the temperature. Both count if all records state them.
+    A law may take a command; a law or a machine may depend on the temperature; records may state a parameter of the
+    law, such as a gas pressure. All count if all records state them.
 
     Arguments:
         model: the law, on its machine if there is one.
@@ -19,9 +21,14 @@ def contradicting(model: Model, runs: Sequence[BenchRun]) -> list[Contradiction]
     """
     law, rig = law_of(model), rig_of(model)
     warms = law.traits().temperature_dependent or (rig is not None and "heat" in rig.effects())
-    if warms and all(run.temperature is not None for run in runs):
+    if warms and all(initial_temperature(run) is not None for run in runs):
         return []
-    return contradictions(runs, same_command=takes_command(law) and all(run.commands is not None for run in runs))
+    same_command = takes_command(law) and all(run.commands is not None for run in runs)
+    stated = stated_parameters(model, runs).values()
+    groups: dict[tuple[float, ...], list[BenchRun]] = {}
+    for i, run in enumerate(runs):
+        groups.setdefault(tuple(values[i] for values in stated), []).append(run)
+    return [pair for group in groups.values() for pair in contradictions(group, same_command=same_command)]
 
 
 def refuse_contradicting(found: Sequence[Contradiction], argument: str = "runs") -> None:

@@ -131,7 +131,8 @@ def fit(
         law: the start: a law; a law class, which estimates its starting values; or a function that returns a law,
             either from the records, if its argument is called `runs`, or from all samples `(velocity, force)`, with
             `stroke` and `time` if it has arguments of these names.
-        runs: one or more records.
+        runs: one or more records. A setting that is named like a parameter of the law, with its unit, is the value of
+            this record, such as a gas pressure; one named `temperature` is how warm it begins.
         rig: the test machine, if it adds to the force of the damper; the load cell of measured records nearly always
             has a zero error, `rig="offset"`, which `compare` fits if nothing is said. Its parameters that differ from
             their defaults are free, with these values as start, beside those of the law: `rig=Rig(gas_force=-100.0,
@@ -147,7 +148,8 @@ def fit(
         tie: parameters that take the values of others, such as `{"terms.1.**": "terms.0.**"}`: one free value for each
             group (see `jaxdamp.parameters.free_parameters`).
         per_record: parameters with one value for each record, such as a friction that depends on the temperature; names
-            as in `freeze`. All other parameters are common to the records.
+            as in `freeze`. All other parameters are common to the records. A record that was not fitted is predicted
+            with their means, and begins as warm (`initial_rise`) as its first three cycles show, which are not scored.
         weighting: `"samples"`, equal weight of every sample; `"runs"`, equal weight of every record relative to its RMS
             force; or one standard deviation [N] for each record, of which only the ratios matter. `inf` leaves a record
             out of the fit; it is still scored.

@@ -20,6 +20,9 @@ from jaxdamp.identify.model import Model
 from jaxdamp.identify.predicting import Compared, Score, compared, errors
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.propagation import Evidence
+from jaxdamp.identify.start_temperatures import warmed
+from jaxdamp.identify.stated import start_paths
+from jaxdamp.parameters import get, with_values
 
 
 PARTS = 4  # into which records, or the time of each record, are divided
@@ -65,7 +68,7 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
     fitted = np.flatnonzero(np.isfinite(problem.sigma))
     runs = [problem.runs[i] for i in fitted]
     groups = motions(runs)
-    whole = len(groups) >= FEWEST_MOTIONS and not (in_time or problem.per_record)
+    whole = not in_time and _as_wholes(result, problem, groups)
     samples: list[Compared] = []
     unreached = [np.ones(len(run), bool) for run in runs]
     left_out = _by_record(runs, groups) if whole else zip(*map(in_time_parts, runs), strict=True)
@@ -73,26 +76,36 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
         factor = _kept(problem, fitted, part)
         if np.all(factor) or not np.any(problem.used & (factor > 0)):
             continue
-        known = np.concatenate([run.velocity[~left] for run, left in zip(runs, part, strict=True)])
-        reached = [(run.velocity >= known.min()) & (run.velocity <= known.max()) for run in runs]
-        for at, left, near in zip(unreached, part, reached, strict=True):
-            at &= ~(left & near)
+        near = _reached(runs, part)
+        unreached = [at & ~reached for at, reached in zip(unreached, near, strict=True)]
         names = [run.name if whole else f"{run.name}, part {number} of {PARTS}" for run in runs]
-        parts = zip(
-            map(int, fitted), names, (left & near for left, near in zip(part, reached, strict=True)), strict=True
-        )
-        samples += compared(_refitted(start, factor), problem.runs, problem.initial_state, parts)
-    beyond = [
-        (int(i), f"{run.name}, beyond the others", at)
-        for i, run, at in zip(fitted, runs, unreached, strict=True)
-        if samples and at.mean() >= LEAST_UNREACHED
-    ]
-    if beyond:
-        models, model = fitted_models(problem, evidence.minimum.values)
-        samples += compared(models or model, problem.runs, problem.initial_state, beyond)
+        parts = zip(map(int, fitted), names, near, strict=True)
+        models, told = _predicting(_refitted(start, factor), fitted, part, result)
+        samples += compared(models, problem.runs, problem.initial_state, parts, told)
+    beyond = _beyond(result, fitted, unreached) if samples else []
     words = f"each of {len(runs)} records" if whole else f"each quarter of the record{'s' * (len(runs) > 1)}"
     words += " predicted by fits without it" + ", all of one motion" * (len(groups) == 1)
-    return _together(samples, words + ", velocities that no other reaches by the fit of all" * bool(beyond))
+    words += ", velocities that no other reaches by the fit of all" * bool(beyond)
+    return _together([*samples, *beyond], words)
+
+
+def _as_wholes(result: FitResult, problem: Problem, groups: Sequence[Sequence[int]]) -> bool:
+    """Whether whole records can be left out: of several motions, with no own number but how warm they begin."""
+    return len(groups) >= FEWEST_MOTIONS and set(problem.per_record) <= set(start_paths(result.model))
+
+
+def _reached(runs: Sequence[BenchRun], part: Part) -> Part:
+    """The samples left out whose velocity the others reach."""
+    known = np.concatenate([run.velocity[~left] for run, left in zip(runs, part, strict=True)])
+    reached = [(run.velocity >= known.min()) & (run.velocity <= known.max()) for run in runs]
+    return tuple(left & near for left, near in zip(part, reached, strict=True))
+
+
+def _beyond(result: FitResult, fitted: np.ndarray, unreached: Sequence[np.ndarray]) -> list[Compared]:
+    """The samples of records that reach far beyond the velocities of all others, by the fit of all."""
+    names = [f"{result.runs[i].name}, beyond the others" for i in fitted]
+    parts = [each for each in zip(map(int, fitted), names, unreached, strict=True) if each[2].mean() >= LEAST_UNREACHED]
+    return compared(result.models_of(result.runs)[0], result.runs, result.initial_state, parts) if parts else []
 
 
 def on_records(result: FitResult, runs: Sequence[BenchRun]) -> HeldOut | None:
@@ -108,7 +121,8 @@ def on_records(result: FitResult, runs: Sequence[BenchRun]) -> HeldOut | None:
             parts += [(i, f"{run.name}, part {k} of {PARTS}", part) for k, part in enumerate(in_time_parts(run), 1)]
         else:
             parts.append((i, run.name, np.ones(len(run), bool)))
-    samples = compared(result.model_of(runs), runs, result.initial_state, parts)
+    models, told = result.models_of(runs)
+    samples = compared(models, runs, result.initial_state, parts, told)
     return _together(samples, f"{len(runs)} record{'s' * (len(runs) > 1)} held out")
 
 
@@ -181,6 +195,25 @@ def anchored_at(evidence: Evidence) -> Problem:
     large = np.clip(np.abs(minimum.values), LEAST_CHANGE * by_force, by_force)
     weight = np.sqrt(minimum.squares / np.count_nonzero(problem.used)) / large
     return problem.started_at(minimum.values)._replace(anchor=(minimum.values, weight))
+
+
+def _predicting(
+    models: Model | list[Model], fitted: np.ndarray, part: Part, result: FitResult
+) -> tuple[Model | list[Model], list[int]]:
+    """The models without a value that records left out had for themselves, and the samples that told it instead.
+
+    Such a record begins as warm as its first cycles show, about the mean of the others.
+    """
+    out = [int(i) for i, left in zip(fitted, part, strict=True) if left.all()]
+    paths = result.own_starts
+    if not isinstance(models, list) or not out or not paths:
+        return models, [0] * len(result.runs)
+    others = [model for i, model in enumerate(models) if i not in out]
+    mean = {path: np.mean([np.asarray(get(model, path)) for model in others]) for path in paths}
+    how = (paths, result.rmse * result.inflation, result.initial_state)
+    new = {i: warmed(with_values(models[i], mean), result.runs[i], *how) for i in out}
+    told = [new[i].told if i in new else 0 for i in range(len(models))]
+    return [new[i].model if i in new else model for i, model in enumerate(models)], told
 
 
 @one_thread()

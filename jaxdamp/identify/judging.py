@@ -24,6 +24,7 @@ from jaxdamp.identify.blending import off_span
 from jaxdamp.identify.contradicting import contradicting
 from jaxdamp.identify.estimates import Estimate
 from jaxdamp.identify.estimating import Estimates, estimate, on_misfit
+from jaxdamp.identify.gas import gas_in_words
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.left_out import left_out
 from jaxdamp.identify.model import (
@@ -35,6 +36,7 @@ from jaxdamp.identify.model import (
     on_rig,
     rig_of,
     starts_in,
+    with_means,
     with_range,
 )
 from jaxdamp.identify.noise import Noise, noise_of
@@ -80,8 +82,9 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     on_records = (*notes_on(model, problem.fitted_to), *off_span(model, problem.fitted_to, problem.initial_state))
     effects = left_out(problem, best)
     on_rest = on_misfit(noise, estimates.estimates, bool(effects))
-    main = (*notes, *on_records, *effects, *estimates.summary, *on_rest)
-    notes += [*on_records, *estimates.notes, *on_rest, *effects]
+    gas = gas_in_words(model, problem.fitted_to, estimates.estimates, estimates.covariance)
+    main = (*notes, *on_records, *effects, *gas, *estimates.summary, *on_rest)
+    notes += [*on_records, *gas, *estimates.notes, *on_rest, *effects]
     return FitResult(
         law=with_standard_errors(law, _errors_of_law(model, estimates.estimates)),
         runs=problem.runs,
@@ -131,7 +134,8 @@ def on_status(best: SearchEnd, remedy: str = "") -> list[str]:
 
 def fitted_models(problem: Problem, values: np.ndarray) -> tuple[list[Model], Model]:
     """The fitted model of each record, where they differ, and the one with the mean of what differs."""
-    built = with_range(problem.free.started_at(values).tree, covered_range(problem.fitted_to))
+    warms = problem.law.traits().temperature_dependent
+    built = with_range(problem.free.started_at(values).tree, covered_range(problem.fitted_to, warms=warms))
     if starts := starts_in(built):
         fitted = [s if np.isfinite(sigma) else None for s, sigma in zip(starts, problem.sigma, strict=True)]
         built = on_rig(law_of(built), rig_of(built), fitted)
@@ -141,7 +145,7 @@ def fitted_models(problem: Problem, values: np.ndarray) -> tuple[list[Model], Mo
     models = [
         of_record(with_values(built, {path: v[i] for path, v in own.items()}), i) for i in range(len(problem.runs))
     ]
-    return models, with_values(built, {path: jnp.mean(v) for path, v in own.items()})
+    return models, with_means(built, problem.per_record)
 
 
 def notes_on(model: Model, runs: Sequence[BenchRun]) -> list[str]:
@@ -190,7 +194,9 @@ def _driving(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
         return []
     velocity = np.concatenate([run.velocity for run in runs])
     order = np.argsort(velocity, kind="stable")
-    velocity, force = velocity[order], np.concatenate(predict_runs(law, runs))[order]
+    still = [dataclasses.replace(run, velocity=np.zeros(len(run))) for run in runs]  # springs and gas are no damping
+    forces = np.concatenate(predict_runs(law, runs)) - np.concatenate(predict_runs(law, still))
+    velocity, force = velocity[order], forces[order]
     at = velocity[drives_motion(velocity, force)]
     if not at.size:
         return []

@@ -13,14 +13,15 @@ from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
 from jaxdamp._tables import Contents, Table, plain, with_unit
 from jaxdamp._types import Figure, VectorLike
-from jaxdamp.bench import BenchRun, as_runs
+from jaxdamp.bench import BenchRun, as_runs, initial_temperature
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.estimates import parameter_table
-from jaxdamp.identify.model import Model, RecordStart, on_rig
-from jaxdamp.identify.predicting import ErrorShares, Score, error_shares, predict_runs, score
+from jaxdamp.identify.model import Model, RecordStart, of_record, on_rig
+from jaxdamp.identify.predicting import ErrorShares, Score, error_shares, predict_by_record, score
 from jaxdamp.identify.propagation import Band, band
 from jaxdamp.identify.record_sensitivity import RecordSensitivity, sensitivity_to_records
 from jaxdamp.identify.result import Fit
+from jaxdamp.identify.start_temperatures import unknown_starts, warmed
 from jaxdamp.rig import Rig
 
 
@@ -63,10 +64,15 @@ class AbstractFitted(AbstractResult):
         """What was fitted to the records: the law, on a machine if that was fitted too."""
         return on_rig(self.law, self.rig)
 
-    def model_of(self, runs: Sequence[BenchRun]) -> Model:
+    def models_of(self, runs: Sequence[BenchRun]) -> tuple[Model | list[Model], list[int]]:
+        """What predicts these records, one or one for each, and how many of the first samples of each told it."""
+        return self._model_of(runs), [0] * len(runs)
+
+    def _model_of(self, runs: Sequence[BenchRun]) -> Model:
         """`model`, with the estimated states at the beginning of those of these records that were fitted."""
         known = {id(run): start for run, start in zip(self.runs, self.record_starts, strict=False)}
-        return on_rig(self.law, self.rig, [known.get(id(run)) for run in runs] if known else ())
+        starts = [known.get(id(run)) for run in runs] if known else ()
+        return on_rig(self.law, self.rig, starts)
 
     @overload
     def respond(self, runs: BenchRun) -> np.ndarray: ...
@@ -83,7 +89,7 @@ class AbstractFitted(AbstractResult):
             runs: one record, or several for a list of forces.
         """
         records = as_runs(runs)
-        forces = predict_runs(self.model_of(records), records, self.initial_state)
+        forces = predict_by_record(self.models_of(records)[0], records, self.initial_state)[1]
         return forces[0] if isinstance(runs, BenchRun) else forces
 
     def predict(self, runs: BenchRun | Iterable[BenchRun]) -> list[np.ndarray]:
@@ -95,7 +101,8 @@ class AbstractFitted(AbstractResult):
     def score(self, runs: BenchRun | Iterable[BenchRun]) -> tuple[float, float, tuple[Score, ...]]:
         """Fit percent, RMSE [N] and the scores by record, on records old or new, as `respond` predicts them."""
         runs = as_runs(runs)
-        return score(self.model_of(runs), runs, initial_state=self.initial_state)
+        models, told = self.models_of(runs)
+        return score(models, runs, initial_state=self.initial_state, told=told)
 
     def content(self) -> Contents:
         """Law, errors and scores as plain data.
@@ -131,10 +138,29 @@ class FitResult(AbstractFitted, Fit):
     @functools.cached_property
     def error_shares(self) -> ErrorShares:
         """Shares of the squared error over the records: shape, hysteresis, rest (`identify.error_shares`)."""
+        return error_shares(self.models_of(self.runs)[0], self.runs, self.initial_state)
+
+    @property
+    def own_starts(self) -> list[str]:
+        """Paths of the temperatures at the start of a record, where each of the fitted ones had a value of its own."""
+        return unknown_starts(self.model, self.runs, () if self.evidence is None else self.evidence.problem.per_record)
+
+    def models_of(self, runs: Sequence[BenchRun]) -> tuple[Model | list[Model], list[int]]:
+        """The model of each record: a fitted one has its own values, a new one begins as warm as its cycles show."""
+        common, told = self._model_of(runs), [0] * len(runs)
         rigs = self.record_rigs or (None,) * len(self.record_laws)
         starts = [(start,) for start in self.record_starts] or [()] * len(self.record_laws)
-        models = [on_rig(*each) for each in zip(self.record_laws, rigs, starts, strict=False)]
-        return error_shares(models or self.model_of(self.runs), self.runs, self.initial_state)
+        each = map(on_rig, self.record_laws, rigs, starts)
+        own = {id(run): model for run, model in zip(self.runs, each, strict=False)}
+        fitted = {id(run) for run in self.runs}
+        paths = self.own_starts
+        new = [i for i, run in enumerate(runs) if id(run) not in fitted and paths and initial_temperature(run) is None]
+        if not own and not new:
+            return common, told
+        models = [own.get(id(run), of_record(common, i)) for i, run in enumerate(runs)]
+        for i in new:
+            models[i], told[i] = warmed(models[i], runs[i], paths, self.rmse * self.inflation, self.initial_state)
+        return models, told
 
     def table(self, truth: AbstractDamper | None = None, *, true_rig: Rig | None = None, title: str = "") -> Table:
         """The parameters with units, standard errors and meanings, compared with a true law if one is given.

@@ -11,6 +11,7 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, laws_inside
+from jaxdamp.identify.gas import charged_apart
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.model import law_of, on_rig, rig_of, starts_in
 from jaxdamp.identify.problem import Problem
@@ -139,7 +140,7 @@ def started_on(law: Start, runs: Sequence[BenchRun], rig: Machine, named: Iterab
     names with an offset or gas force, this has the whole static force of the records: a constant force of the law, such
     as the preload of a `Spring`, is held at zero. The machine's is left out beside a law whose static force has a
     meaning of its own, such as the gas charge of a `MonoTube`, which is the points of a table together, or which the
-    call gives a value or a name.
+    call gives a value or a name; but it stays where records state several charges, which tell the two apart.
 
     Arguments:
         law: the start.
@@ -159,8 +160,9 @@ def started_on(law: Start, runs: Sequence[BenchRun], rig: Machine, named: Iterab
             begin = started(law, bare) if trained else begin
             zero = with_values(begin, {path: np.zeros_like(get(begin, path)) for path in constants})
             return Beginning(zero, machine, tuple(f"law.{path}" for path in constants))
-        left = dataclasses.replace(machine, force_offset=Rig().force_offset, gas_force=Rig().gas_force)
-        machine = left if free_fields(left) else None
+        if not charged_apart(begin, runs):
+            left = dataclasses.replace(machine, force_offset=Rig().force_offset, gas_force=Rig().gas_force)
+            machine = left if free_fields(left) else None
     elif not trained:
         return Beginning(begin, machine)
     return Beginning(started(law, without_machine(machine, runs)), machine)
@@ -292,7 +294,8 @@ def with_static_force_on_machine(problem: Problem, solution: Solution) -> tuple[
 def static_force_in_words(result: FitResult, runs: tuple[BenchRun, ...]) -> list[str]:
     """A sentence on a static force that is gas force or zero error, if it is large enough to matter."""
     offset = 0.0 if result.rig is None else float(np.mean(np.asarray(result.rig.force_offset)))
-    if abs(offset) < LARGE * float(np.std(np.concatenate([run.force for run in runs]))):
+    small = LARGE * float(np.std(np.concatenate([run.force for run in runs])))
+    if abs(offset) < small or charged_apart(result.law, runs):
         return []
     return [
         f"The static force of {offset:.0f} N is gas force or zero error of the load cell: these records cannot tell."

@@ -12,6 +12,7 @@ from jaxdamp.identify.contradicting import contradicting, refuse_contradicting
 from jaxdamp.identify.machine import absent_paths, started_on
 from jaxdamp.identify.model import Model, on_rig
 from jaxdamp.identify.starting import Start
+from jaxdamp.identify.stated import start_paths, stated_parameters, stated_values
 from jaxdamp.parameters import FreeParameters, free_parameters
 from jaxdamp.rig import Rig
 
@@ -54,7 +55,13 @@ def fitted_records(name: str, runs: tuple[BenchRun, ...], options: Options) -> t
 
 
 def refuse_several_laws(name: str, runs: tuple[BenchRun, ...], model: Model, options: Options) -> None:
-    """Refuse records of one damper that no one law can follow, unless they are to be kept, or begin by themselves."""
+    """Refuse records of one damper that no one law can follow, unless they are to be kept, or begin by themselves.
+
+    Records that state parameters of the law are refused, too.
+    """
+    if paths := list(stated_parameters(model, runs)):
+        remedy = "Fit such dampers one by one, with `fit`, or leave this setting out."
+        _checks.refuse(f"dampers[{name!r}]", "have records that state no parameter of the law", ", ".join(paths), remedy)
     if options["bad_records"] != "keep" and options["initial_state"] != "estimated":
         refuse_contradicting(contradicting(model, runs), f"dampers[{name!r}]")
 
@@ -82,6 +89,8 @@ def begun_on(law: Start, runs: Sequence[BenchRun], options: Options, shared: Ite
     named = [*(bounds or ()), *(priors or ()), *(tie or ()), *shared]
     begun, machine, held = started_on(law, runs, options["rig"], named)
     model = on_rig(begun, machine)
+    stated = stated_values(model, runs)  # temperatures that the records begin with
+    held = (*held, *(path for path in start_paths(model) if path in stated))
     freeze = (*options["freeze"], *absent_paths(machine), *held)
     free = free_parameters(model, freeze=freeze, bounds=bounds, tie=tie)
     _checks.finite("law", free.values)

@@ -10,10 +10,10 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from jaxdamp._types import Scalar, State, Vector
-from jaxdamp.bench import BenchRun
+from jaxdamp.bench import BenchRun, initial_temperature
 from jaxdamp.dampers import AbstractDamper, FittedRange, with_fitted_range, without_standard_errors
 from jaxdamp.identify.initial_states import Cycle, periodic_state
-from jaxdamp.parameters import AbstractDeclared, FreeParameters, Module, parameter, readable
+from jaxdamp.parameters import AbstractDeclared, FreeParameters, Module, get, parameter, readable, with_values
 from jaxdamp.rig import Followed, Rig, Sensor, march
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -154,6 +154,11 @@ def with_range(model: Model, fitted_to: FittedRange) -> Model:
     return on_rig(with_fitted_range(without_standard_errors(law_of(model)), fitted_to), rig_of(model), starts_in(model))
 
 
+def with_means(model: Model, paths: Sequence[str]) -> Model:
+    """The model with the mean over the records at paths where it has a value for each."""
+    return with_values(model, {path: jnp.mean(get(model, path)) for path in paths})
+
+
 def blind_end(model: Model, dt: float) -> int:
     """So many samples at the end of a record cannot be predicted: their force needs the motion behind the end."""
     rig = rig_of(model)
@@ -221,11 +226,12 @@ def joined_range(ranges: Sequence[FittedRange]) -> FittedRange:
     )
 
 
-def covered_range(runs: Sequence[BenchRun]) -> FittedRange:
+def covered_range(runs: Sequence[BenchRun], *, warms: bool = False) -> FittedRange:
     """Lowest and highest value of each channel over all records, and of temperature and command if stated.
 
     Arguments:
         runs: the records that were fitted, one or more.
+        warms: whether the law depends on the temperature, so that the one at the start of the records counts too.
 
     >>> from jaxdamp import bench, dampers
     >>> runs = bench.VirtualDyno(dampers.Linear(1500.0)).run([bench.SineTest(0.01, f) for f in (1.0, 3.0)])
@@ -235,6 +241,8 @@ def covered_range(runs: Sequence[BenchRun]) -> FittedRange:
     channels = {name: [getattr(run, name) for run in runs] for name in ("velocity", "stroke", "force")}
     channels["frequency"] = [np.array([run.frequency]) for run in runs]
     channels["temperature"] = [run.temperature for run in runs if run.temperature is not None]
+    if warms and not channels["temperature"]:
+        channels["temperature"] = [np.array([t]) for run in runs if (t := initial_temperature(run)) is not None]
     channels["command"] = [run.commands for run in runs if run.commands is not None]
     joined = {name: np.concatenate(values) for name, values in channels.items() if values}
     limits = {name: (float(values.min()), float(values.max())) for name, values in joined.items()}

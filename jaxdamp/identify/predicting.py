@@ -165,6 +165,7 @@ def compared(
     runs: Sequence[BenchRun],
     initial_state: str = "warm_up",
     parts: Iterable[tuple[int, str, Bool[np.ndarray, " _"]]] | None = None,
+    told: Sequence[int] = (),
 ) -> list[Compared]:
     """The samples that a model, or one for each record, is compared over: those that count, of records or their parts.
 
@@ -174,11 +175,14 @@ def compared(
         initial_state: how they start, as in `fit`.
         parts: the number of the record, the name and the samples of each part; those without a sample that counts are
             left out. None for all records.
+        told: samples at the beginning of each record that told something of the model, which are not compared.
     """
     models, forces = predict_by_record(model, runs, initial_state)
     distinct = {id(each): each for each in models}.values()  # most often one model for all records
     memoryless = {id(each): is_memoryless(each) for each in distinct}
     used = [used_samples(own, run, memoryless[id(own)], initial_state) for own, run in zip(models, runs, strict=True)]
+    if any(told):
+        used = [slice(max(k.start or 0, n), k.stop) for k, n in zip(used, told, strict=True)]
     if parts is None:
         return [Compared(run.name, run.force[k], f[k]) for run, f, k in zip(runs, forces, used, strict=True)]
     chosen = [(i, name, np.flatnonzero(part[used[i]]) + (used[i].start or 0)) for i, name, part in parts]
@@ -202,9 +206,10 @@ def score(
     runs: Sequence[BenchRun],
     counted: Sequence[bool] | np.ndarray | None = None,
     initial_state: str = "warm_up",
+    told: Sequence[int] = (),
 ) -> tuple[float, float, tuple[Score, ...]]:
     """Fit percent and RMSE [N] of a model, or of one for each record, over the records that count, and for each."""
-    samples = compared(model, runs, initial_state)
+    samples = compared(model, runs, initial_state, told=told)
     percent, rmse, rows = errors(samples)
     if counted is not None:
         percent, rmse, _ = errors([each for each, counts in zip(samples, counted, strict=True) if counts])

@@ -1,6 +1,6 @@
 """`prepare`: a law and bench records as a least-squares problem."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import jax.numpy as jnp
@@ -26,9 +26,11 @@ from jaxdamp.identify.model import (
     law_of,
     on_rig,
     rig_of,
+    with_means,
 )
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.starting import Start, frozen_by
+from jaxdamp.identify.stated import stated_parameters, stated_values, with_stated
 from jaxdamp.identify.traces import batches, owners, places
 from jaxdamp.parameters import free_parameters, match_paths, matching, name_patterns, parameters, with_values
 
@@ -99,8 +101,11 @@ def prepare(
         model, expected, unfitted = _with_estimated_states(model, runs, sigma)
         absent = [*absent, *unfitted]
     _refuse_two_readings(model, freeze=freeze, per_record=per_record, over=over, bounds=bounds, priors=priors, tie=tie)
-    own = _per_record(model, per_record, sigma, absent)
+    stated = stated_values(model, runs)
+    model = with_stated(model, stated_parameters(model, fitted_to))
+    own = _per_record(model, per_record, sigma, absent, stated)
     frozen = [*name_patterns("freeze", freeze), *frozen_by(law), *absent, *not_chosen(model, over, "rig.", STARTS)]
+    frozen += [p.path for p in parameters(model) if p.path in stated]
     free = free_parameters(_spread(model, own, len(runs)), freeze=frozen, bounds=bounds, tie=tie)
     _checks.finite("law", free.values)
     residuals, ranges = batches(model, runs, sigma, samples_per_cycle, own, initial_state)
@@ -161,8 +166,11 @@ def not_chosen(model: Model | VehicleTest, over: Sequence[str] | None, *beside: 
 
 def records_in_words(problem: Problem) -> str:
     """What of the records is left out, and how they start, where that differs from the usual; else empty."""
-    model, runs = problem.free.tree, problem.fitted_to
-    parts = [] if is_memoryless(model) else [starts_in_words(runs, problem.initial_state)]
+    model, runs = with_means(problem.free.tree, problem.per_record), problem.fitted_to
+    stated = stated_parameters(model, runs).items()
+    spans = [f"{path} {np.min(values):.4g} to {np.max(values):.4g}" for path, values in stated]
+    parts = [f"stated by the records: {', '.join(spans)}"] * bool(spans)
+    parts += [] if is_memoryless(model) else [starts_in_words(runs, problem.initial_state)]
     if not can_rest(model):
         resting = [(run, moving_samples(run)) for run in runs]
         resting = [(run, moving) for run, moving in resting if moving.stop - moving.start < len(run)]
@@ -173,13 +181,19 @@ def records_in_words(problem: Problem) -> str:
     return "; ".join(filter(None, parts))
 
 
-def _per_record(model: Model, names: Sequence[str], sigma: Sequence[float], absent: Sequence[str]) -> tuple[str, ...]:
+def _per_record(
+    model: Model, names: Sequence[str], sigma: Sequence[float], absent: Sequence[str], stated: Collection[str]
+) -> tuple[str, ...]:
     """Paths of the parameters that have a value for each record."""
     by_path = {p.path: p for p in parameters(model)}
     paths = match_paths(list(by_path), name_patterns("per_record", names))
+    paths = [path for path in paths if path not in absent] or paths
     for path in set(paths) & set(absent):
         remedy = f"Give it a start: `rig=Rig({path.removeprefix('rig.')}=...)`."
         _checks.refuse("per_record", "name parameters that are free", f"{path}, which the rig leaves out", remedy)
+    for path in set(paths) & set(stated):
+        remedy = "Leave it out, or their temperature: they would be two values of one number."
+        _checks.refuse("per_record", "name numbers that the records do not state", path, remedy)
     for path in paths:
         if by_path[path].value.ndim:
             remedy = "Only single numbers can differ from record to record."

@@ -27,14 +27,13 @@ from jaxdamp.identify.model import law_of, rig_of
 from jaxdamp.identify.predicting import score
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.starting import Start, frozen_by
+from jaxdamp.identify.stated import stated_parameters
 from jaxdamp.parameters import get, match_paths, name_patterns, parameters, with_values
 from jaxdamp.rig import Rig
 
 
 CALL = "fit_scheduled(law, runs)"
 OF_THE_RESULT = ("loss", "force_noise", "input_noise", "bad_records")  # options of `fit` without a part in starts
-
-
 Alone = dict[float, AtSetting]
 
 
@@ -333,7 +332,8 @@ class Chain:
         """The paths of the parameters that are common to all settings."""
         paths = [[p.path for p in parameters(law)] for law in laws]
         in_all = [path for path in paths[0] if all(path in of_law for of_law in paths)]
-        return match_paths(in_all, name_patterns("common", self.common))
+        stated = stated_parameters(laws[0], self.runs)  # each level has them as its records state them
+        return [path for path in match_paths(in_all, name_patterns("common", self.common)) if path not in stated]
 
     def without(self, setting: float, blend: str, shown: Callable[[str], None]) -> LeftOutSetting:
         """The score at a setting of the law interpolated from all others; its records have no part in any start."""

@@ -10,9 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from jaxdamp import _checks
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import check_commands, command_paths, takes_command, with_command
 from jaxdamp.identify.initial_states import Cycle
 from jaxdamp.identify.model import (
     Model,
@@ -21,9 +19,7 @@ from jaxdamp.identify.model import (
     initial_state,
     initial_state_for,
     is_memoryless,
-    law_of,
     marched,
-    rig_of,
     starts_in,
 )
 from jaxdamp.identify.problem import AbstractResiduals
@@ -33,17 +29,16 @@ from jaxdamp.identify.rows import (
     channel,
     cycles_of,
     on_device,
-    refuse_units,
     resting_blocks,
     row_of,
     samples_in_block,
 )
+from jaxdamp.identify.stated import followed_channels, stated_values
 from jaxdamp.parameters import get, with_values
 from jaxdamp.rig import Followed
 
 
 MOST_GROUPS = 2  # batches of a law with states: each is compiled on its own
-COMMAND_REMEDY = 'Pass it when reading, `bench.read(..., command={"*_0.5A": 0.5})`.'
 RECORDS_IN_GROUP = 200  # of many dampers, for which a further batch saves a quarter of the work
 
 
@@ -219,50 +214,6 @@ def _memoryless_batch(
     return (Batch(*map(on_device, arrays), fixed={}, per_record=(), substeps=1, **followed),), ranges
 
 
-def _stated(model: Model, runs: Sequence[BenchRun]) -> dict[str, list[float]]:
-    """Values that the records state for the law, by path: the command, if the law has one and it is held in all."""
-    commands, law = [run.command for run in runs if run.command is not None], law_of(model)
-    if not takes_command(law) or not commands or _vary(runs):
-        return {}
-    _refuse_some("command", runs, COMMAND_REMEDY)
-    for command in set(commands):
-        with_command(law, command)  # refuses what is out of range
-    return dict.fromkeys(command_paths(model), commands)
-
-
-def _vary(runs: Sequence[BenchRun]) -> bool:
-    """Whether the command varies in one of the records."""
-    return any(run.command_channel is not None for run in runs)
-
-
-def _refuse_some(what: str, runs: Sequence[BenchRun], remedy: str) -> None:
-    """Refuse records of which some state what others do not."""
-    lacking = [run.name for run in runs if getattr(run, what) is None]
-    if lacking:
-        _checks.refuse("runs", f"all state their {what}", f"without one: {', '.join(lacking)}", remedy)
-
-
-def _channels(model: Model, runs: Sequence[BenchRun]) -> list[str]:
-    """The channels that a model is compared with, the temperature among them if it says something of the force."""
-    channels, rig = ["stroke", "velocity", "force"], rig_of(model)
-    law = law_of(model)
-    varying = ["command"] if takes_command(law) and _vary(runs) else []
-    if varying:
-        _refuse_some("commands", runs, COMMAND_REMEDY)
-        refuse_units(runs)
-        for run in runs:
-            check_commands(f"command of {run.name!r}", law, channel(run, "command"))
-    of_rig = rig is not None and (
-        np.any(np.asarray(rig.temperature_slope)) or np.any(np.asarray(rig.gas_temperature_slope))
-    )
-    if not (of_rig or law.traits().temperature_dependent):
-        return channels + varying
-    if all(run.temperature is None for run in runs):
-        return channels + varying
-    _refuse_some("temperature", runs, "Fit those with and those without it apart.")
-    return [*channels, "temperature", *varying]
-
-
 def batches(
     model: Model,
     runs: Sequence[BenchRun],
@@ -291,7 +242,7 @@ def batches(
     Returns:
         The batches, and for each record where it is.
     """
-    fixed, channels = _stated(model, runs), _channels(model, runs)
+    fixed, channels = stated_values(model, runs), followed_channels(model, runs)
     if is_memoryless(model) and not (fixed or per_record):
         return _memoryless_batch(model, runs, sigma, samples_per_cycle, channels)
     rows, groups, made = _row_batches(model, runs, sigma, samples_per_cycle, per_record, initial_state)
@@ -323,10 +274,10 @@ def _row_batches(
 ) -> tuple[list[Row], list[list[int]], tuple[Batch, ...]]:
     """A row for each record, the groups of rows, and the batch of each group."""
     start = "rest" if is_memoryless(model) else initial_state_for(model, initial_state)
-    channels = _channels(model, runs)
+    channels = followed_channels(model, runs)
     how = (samples_per_cycle, model, can_rest(model), channels, start)
     rows = [row_of(run, s, *how, number) for number, (run, s) in enumerate(zip(runs, sigma, strict=True))]
-    groups, fixed, effects = _grouped(rows), _stated(model, runs), effects_of(model)
+    groups, fixed, effects = _grouped(rows), stated_values(model, runs), effects_of(model)
     members = [([rows[i] for i in group], [runs[i] for i in group]) for group in groups]
     return rows, groups, tuple(_batch(*of, fixed, per_record, effects, channels) for of in members)
 

@@ -11,7 +11,7 @@ from jaxdamp._progress import Progress
 from jaxdamp._results import drawn_by
 from jaxdamp._tables import Cell, Column, Contents, Table, with_unit
 from jaxdamp.bench import RideRecord
-from jaxdamp.identify.comparison import AbstractComparison, side_by_side
+from jaxdamp.identify.comparison import AbstractComparison, naming_only, side_by_side
 from jaxdamp.identify.model import VehicleTest
 from jaxdamp.identify.recommending import doubt_of, why
 from jaxdamp.identify.rungs import Failure
@@ -19,14 +19,11 @@ from jaxdamp.identify.vehicle_fitting import fit_vehicle
 from jaxdamp.identify.vehicle_held_out import on_drives, without_drives
 from jaxdamp.identify.vehicle_preparing import checked_records
 from jaxdamp.identify.vehicle_result import ChannelScore, VehicleFit
-from jaxdamp.parameters import matching, parameters
+from jaxdamp.parameters import parameters
 from jaxdamp.vehicles import AbstractVehicle
 
 
 EXACT = 1e-4  # of the standard deviation of a channel: smaller errors are all alike
-NAMED = ("over", "freeze", "per_record", "bounds", "priors", "tie")  # options that name parameters
-
-Names = str | Sequence[str] | Mapping[str, object] | None
 
 
 class VehicleRung(NamedTuple):
@@ -226,8 +223,7 @@ def fit_each_vehicle(
     known = {name: [p.path for p in parameters(test)] for name, test in tests.items()}
 
     def fitted(name: str, vehicle: AbstractVehicle) -> VehicleRung | Failure:
-        own: dict[str, Any] = dict(options)
-        own.update((key, _of(known[name], known.values(), own[key])) for key in NAMED if key in own)
+        own = naming_only(options, known[name], known.values())
         try:
             result = fit_vehicle(vehicle, rides, **own)
             judged = on_drives(result, held_out) if held_out else without_drives(result)
@@ -236,17 +232,3 @@ def fit_each_vehicle(
         return VehicleRung(name, result, *judged)
 
     yield from side_by_side(fitted, vehicles, progress)
-
-
-def _of(own: Sequence[str], every: Iterable[Sequence[str]], names: Names) -> Names:
-    """The names of parameters that this vehicle has, or none of the vehicles, which its fit then refuses."""
-    if names is None:
-        return None
-    every = [*every]
-
-    def counts(name: str) -> bool:
-        return bool(matching(own, name)) or not any(matching(paths, name) for paths in every)
-
-    if isinstance(names, Mapping):
-        return {name: value for name, value in names.items() if counts(name)}
-    return [name for name in ([names] if isinstance(names, str) else names) if counts(name)]
