@@ -140,7 +140,6 @@ def settings_apart(runs: Sequence[BenchRun]) -> tuple[dict[str, str], str]:
         (what, settings)
         for what, settings in _candidates(runs)
         if all(settings[first] != settings[second] for first, second in apart)
-        and (len(set(settings.values())) < len(runs) or len(runs) == 2)
     ]
     if not kinds:
         said = "they are not pooled but stand one by one, since neither names nor settings tell them apart. "
@@ -151,23 +150,26 @@ def settings_apart(runs: Sequence[BenchRun]) -> tuple[dict[str, str], str]:
 
 
 def _candidates(runs: Sequence[BenchRun]) -> list[tuple[str, dict[str, str]]]:
-    """What may tell records apart: each setting that all of them state, and each word of their names, from the last."""
+    """What may tell records apart: settings that all of them state, words of their names, settings in their names.
+
+    What differs from record to record, such as a running number, tells nothing, unless it is written as an adjuster is.
+    """
     words = {run.name: re.split(r"[_\s,;()]+|-(?=\D)", run.name) for run in runs}
     places = range(-1, -min(map(len, words.values())) - 1, -1)
     named = [("a word of their names", {name: parts[i] for name, parts in words.items()}) for i in places]
-    stated, read = _stated(runs)
-    return [*stated, *named, *read]
-
-
-def _stated(runs: Sequence[BenchRun]) -> list[list[tuple[str, dict[str, str]]]]:
-    """The settings that all records state: those from elsewhere, and those that were read from their names."""
-    divided: list[list[tuple[str, dict[str, str]]]] = [[], []]
-    read = [settings_in_name(run.name) for run in runs]
-    for key in runs[0].settings:
-        if all(key in run.settings for run in runs):
-            of_names = all(names.get(key) == run.settings[key] for names, run in zip(read, runs, strict=True))
-            divided[of_names].append((f"`{key}`", {run.name: f"{run.settings[key]}" for run in runs}))
-    return divided
+    in_names = {run.name: settings_in_name(run.name) for run in runs}
+    keys = [key for key in runs[0].settings if all(key in run.settings for run in runs)]
+    keys = [key for key in keys if any(in_names[run.name].get(key) != run.settings[key] for run in runs)]
+    stated = [(f"`{key}`", {run.name: f"{run.settings[key]}" for run in runs}) for key in keys]
+    shared = [
+        (what, settings)
+        for what, settings in (*stated, *named)
+        if len(set(settings.values())) < len(runs) or len(runs) == 2 or all(map(settings_in_name, settings.values()))
+    ]
+    read = [key for key in in_names[runs[0].name] if all(key in found for found in in_names.values())]
+    single = [(f"`{key}`", {name: f"{found[key]:g}" for name, found in in_names.items()}) for key in read]
+    together = {name: ", ".join(f"{key} {found[key]:g}" for key in read) for name, found in in_names.items()}
+    return [*shared, *single, *([(", ".join(f"`{key}`" for key in read), together)] if len(read) > 1 else [])]
 
 
 def by_number(text: str) -> tuple[float, str]:
