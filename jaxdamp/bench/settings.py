@@ -157,19 +157,29 @@ def _candidates(runs: Sequence[BenchRun]) -> list[tuple[str, dict[str, str]]]:
     words = {run.name: re.split(r"[_\s,;()]+|-(?=\D)", run.name) for run in runs}
     places = range(-1, -min(map(len, words.values())) - 1, -1)
     named = [("a word of their names", {name: parts[i] for name, parts in words.items()}) for i in places]
-    in_names = {run.name: settings_in_name(run.name) for run in runs}
-    keys = [key for key in runs[0].settings if all(key in run.settings for run in runs)]
-    keys = [key for key in keys if any(in_names[run.name].get(key) != run.settings[key] for run in runs)]
-    stated = [(f"`{key}`", {run.name: f"{run.settings[key]}" for run in runs}) for key in keys]
     shared = [
         (what, settings)
-        for what, settings in (*stated, *named)
+        for what, settings in (*_stated(runs), *named)
         if len(set(settings.values())) < len(runs) or len(runs) == 2 or all(map(settings_in_name, settings.values()))
     ]
-    read = [key for key in in_names[runs[0].name] if all(key in found for found in in_names.values())]
-    single = [(f"`{key}`", {name: f"{found[key]:g}" for name, found in in_names.items()}) for key in read]
-    together = {name: ", ".join(f"{key} {found[key]:g}" for key in read) for name, found in in_names.items()}
-    return [*shared, *single, *([(", ".join(f"`{key}`" for key in read), together)] if len(read) > 1 else [])]
+    return [*shared, *_in_names(runs)]
+
+
+def _stated(runs: Sequence[BenchRun]) -> list[tuple[str, dict[str, str]]]:
+    """The settings that all records state, without those that were read from their names."""
+    keys = [key for key in runs[0].settings if all(key in run.settings for run in runs)]
+    keys = [key for key in keys if any(settings_in_name(run.name).get(key) != run.settings[key] for run in runs)]
+    return [(f"`{key}`", {run.name: f"{run.settings[key]}" for run in runs}) for key in keys]
+
+
+def _in_names(runs: Sequence[BenchRun]) -> list[tuple[str, dict[str, str]]]:
+    """The settings that all names state, one by one and together."""
+    found = {run.name: settings_in_name(run.name) for run in runs}
+    keys = [key for key in found[runs[0].name] if all(key in settings for settings in found.values())]
+    single = [(f"`{key}`", {name: f"{settings[key]:g}" for name, settings in found.items()}) for key in keys]
+    short = {key: key.removesuffix("_clicks") for key in keys}
+    words = {name: " ".join(f"{short[key]} {settings[key]:g}" for key in keys) for name, settings in found.items()}
+    return [*single, *([(" and ".join(f"`{key}`" for key in keys), words)] if len(keys) > 1 else [])]
 
 
 def by_number(text: str) -> tuple[float, str]:

@@ -24,11 +24,11 @@ from jaxdamp.identify.lanes import Fitted, LanePriors, Lanes, Products, by_round
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import Machine, absent_paths, started_on
 from jaxdamp.identify.many_result import ManyFits
-from jaxdamp.identify.model import initial_state_for, on_rig, rig_of
+from jaxdamp.identify.model import initial_state_for, law_names, on_rig, rig_of
 from jaxdamp.identify.preparing import weights
 from jaxdamp.identify.several import other_starts
 from jaxdamp.identify.starting import Start
-from jaxdamp.parameters import Coordinates, FreeParameters, free_parameters
+from jaxdamp.parameters import Coordinates, FreeParameters, free_parameters, name_patterns
 from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, SearchLanes, least_squares_on_host
 
 
@@ -119,11 +119,16 @@ def fit_many(
     if bad_records != "keep" and initial_state != "estimated":
         for name, runs in zip(names, records, strict=True):
             refuse_contradicting(contradicting(model, runs), f"dampers[{name!r}]")
-    free = free_parameters(model, freeze=[*freeze, *absent_paths(machine), *held], bounds=bounds, tie=tie)
-    _checks.finite("law", free.values)
-    depends = dependence(free, shared, stated, len(names))
     how = {"rig": rig, "freeze": freeze, "bounds": bounds, "tie": tie, "weighting": weighting, "loss": loss}
     how |= {"priors": priors, "initial_state": initial_state, "samples_per_cycle": samples_per_cycle}
+    named = law_names(model)
+    priors = named.find_keys("priors", priors)
+    frozen = [*named.find("freeze", freeze), *absent_paths(machine), *held]
+    limits, tied = named.find_keys("bounds", bounds), named.find_keys("tie", tie)
+    free = free_parameters(model, freeze=frozen, bounds=limits, tie=tied)
+    _checks.finite("law", free.values)
+    degrees = shared if isinstance(shared, Mapping) else dict.fromkeys(name_patterns("shared", shared), 0)
+    depends = dependence(free, named.find_keys("shared", degrees), stated, len(names))
     how |= {"max_steps": max_steps, "bad_records": "keep"}
     many = functools.partial(ManyFits, tuple(names), tuple(records), stated, free=free, options=how)
     initial_state = initial_state_for(model, initial_state)

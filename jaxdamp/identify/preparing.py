@@ -23,6 +23,7 @@ from jaxdamp.identify.model import (
     can_rest,
     initial_state_for,
     is_memoryless,
+    law_names,
     law_of,
     on_rig,
     rig_of,
@@ -30,7 +31,7 @@ from jaxdamp.identify.model import (
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.identify.traces import batches, owners, places
-from jaxdamp.parameters import free_parameters, match_paths, matching, name_patterns, parameters, with_values
+from jaxdamp.parameters import free_parameters, match_paths, name_patterns, parameters, with_values
 
 
 FIT_OUTSIDE = "Call it outside `jax.jit`, `jax.grad` and `jax.vmap`; the residuals of a `Problem` can be traced."
@@ -90,17 +91,24 @@ def prepare(
         _checks.refuse("runs", "hold a force that varies", "records of a constant force", "Check the force channel.")
     sigma = weights(weighting, runs)
     fitted_to = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
-    named = [*name_patterns("per_record", per_record), *(bounds or ()), *(priors or ()), *(tie or {})]
-    begin, machine, held = started_on(law, fitted_to, rig, named)
+    stated = [*name_patterns("per_record", per_record), *(bounds or ()), *(priors or ()), *(tie or {})]
+    begin, machine, held = started_on(law, fitted_to, rig, stated)
     model, absent = on_rig(begin, machine), [*absent_paths(machine), *held]
     initial_state = initial_state_for(model, initial_state)
     expected: tuple[Priors, ...] = ()
     if initial_state == "estimated":
         model, expected, unfitted = _with_estimated_states(model, runs, sigma)
         absent = [*absent, *unfitted]
-    _refuse_two_readings(model, freeze=freeze, per_record=per_record, over=over, bounds=bounds, priors=priors, tie=tie)
-    own = _per_record(model, per_record, sigma, absent)
-    frozen = [*name_patterns("freeze", freeze), *frozen_by(law), *absent, *not_chosen(model, over, "rig.", STARTS)]
+    named = law_names(model)
+    own = _per_record(model, named.find("per_record", per_record), sigma, absent)
+    chosen = None if over is None else named.find("over", over)
+    left = not_chosen(model, chosen, "rig.", STARTS)
+    frozen = [*named.find("freeze", freeze), *named.find("freeze", frozen_by(law)), *absent, *left]
+    bounds, priors, tie = (
+        named.find_keys("bounds", bounds),
+        named.find_keys("priors", priors),
+        named.find_keys("tie", tie),
+    )
     free = free_parameters(_spread(model, own, len(runs)), freeze=frozen, bounds=bounds, tie=tie)
     _checks.finite("law", free.values)
     residuals, ranges = batches(model, runs, sigma, samples_per_cycle, own, initial_state)
@@ -134,22 +142,6 @@ def _with_estimated_states(
     mean, deviation = (jnp.asarray(a[fitted]) for a in (states.expected, states.size))
     prior = Priors(tuple(map(str, paths[fitted])), mean, deviation, mean.size, jnp.ones(()), weak=True)
     return on_rig(law_of(model), rig_of(model), starts), (prior,), [str(path) for path in paths[~fitted]]
-
-
-def _refuse_two_readings(model: Model, **given: Iterable[str] | None) -> None:
-    """Refuse a pattern such as "law.*" that beside a machine stands for other numbers than for the law alone.
-
-    All paths of a law on a machine begin with "law.", as do those of a law in a wrapper by themselves.
-    """
-    law = law_of(model)
-    beside, alone = ([p.path for p in parameters(tree)] for tree in (model, law))
-    for argument, patterns in given.items() if law is not model else ():
-        for pattern in [patterns] if isinstance(patterns, str) else patterns or ():
-            long, short = matching(beside, pattern), [f"law.{path}" for path in matching(alone, pattern)]
-            if "*" in pattern and pattern.startswith("law.") and short and long != short:
-                remedy = f"It is {', '.join(short)} of the law, but {', '.join(long)} beside a machine, where all paths"
-                remedy += ' of the law begin with "law.". Write the names that you mean.'
-                _checks.refuse(argument, "be patterns with one meaning", repr(pattern), remedy)
 
 
 def not_chosen(model: Model | VehicleTest, over: Sequence[str] | None, *beside: str) -> list[str]:

@@ -128,7 +128,7 @@ def _forces_in_words(evaluation: Evaluation, setting: str, velocity: float) -> s
     words = " and ".join(f"{Column('').text(force)} N in {side}" for side, force in forces.items())
     if len(forces) == 2 and float(forces["compression"]):
         words += f", ratio {abs(float(forces['rebound']) / float(forces['compression'])):.2f}"
-    off = f", without the static force of {static:.0f} N" if static else ", gas force included"
+    off = f", without the static force of {round(static)} N" if static else ", gas force included"
     return words + off if words else ""
 
 

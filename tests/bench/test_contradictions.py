@@ -44,7 +44,7 @@ def test_another_setting_is_named_with_its_size():
         (("soft_0A", "mid_0.5A", "hard_1.0A"), ["0A", "0.5A", "1.0A"]),
         (
             ("C2 R1", "C2 R4", "C9 R1"),
-            [f"compression_clicks {c}, rebound_clicks {r}" for c, r in ((2, 1), (2, 4), (9, 1))],
+            [f"compression {c} rebound {r}" for c, r in ((2, 1), (2, 4), (9, 1))],
         ),
         (("first", "second", "third"), ["first", "second", "third"]),
     ],
