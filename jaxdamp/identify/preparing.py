@@ -84,11 +84,7 @@ def prepare(
     """
     _checks.one_of("initial_state", initial_state, INITIAL_STATES)
     _checks.untraced("law", law, FIT_OUTSIDE)
-    runs = as_runs(runs, call="fit(law, runs)")
-    if not runs:
-        _checks.refuse("runs", "hold at least one record", "empty", "Read some with `bench.read`.")
-    if not any(np.ptp(run.force) > 0 for run in runs):
-        _checks.refuse("runs", "hold a force that varies", "records of a constant force", "Check the force channel.")
+    runs = _records(runs)
     sigma = weights(weighting, runs)
     fitted_to = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
     stated = [*name_patterns("per_record", per_record), *(bounds or ()), *(priors or ()), *(tie or {})]
@@ -125,6 +121,16 @@ def prepare(
     return Problem(
         free, (*residuals, *known), level, runs, sigma, owner, reach, begin, own, each, steps, where, initial_state
     )
+
+
+def _records(runs: BenchRun | Iterable[BenchRun]) -> Sequence[BenchRun]:
+    """The records, at least one, whose forces are not all constant."""
+    runs = as_runs(runs, call="fit(law, runs)")
+    if not runs:
+        _checks.refuse("runs", "hold at least one record", "empty", "Read some with `bench.read`.")
+    if not any(np.ptp(run.force) > 0 for run in runs):
+        _checks.refuse("runs", "hold a force that varies", "records of a constant force", "Check the force channel.")
+    return runs
 
 
 def _with_estimated_states(
