@@ -97,8 +97,7 @@ def prepare(
         absent = [*absent, *unfitted]
     named = law_names(model)
     own = _per_record(model, named.find("per_record", per_record), sigma, absent)
-    chosen = None if over is None else named.find("over", over)
-    left = not_chosen(model, chosen, "rig.", STARTS)
+    left = not_chosen(model, over, "rig.", STARTS)
     frozen = [*named.find("freeze", freeze), *named.find("freeze", frozen_by(law)), *absent, *left]
     bounds, priors, tie = (
         named.find_keys("bounds", bounds),
@@ -123,7 +122,7 @@ def prepare(
     )
 
 
-def _records(runs: BenchRun | Iterable[BenchRun]) -> Sequence[BenchRun]:
+def _records(runs: BenchRun | Iterable[BenchRun]) -> tuple[BenchRun, ...]:
     """The records, at least one, whose forces are not all constant."""
     runs = as_runs(runs, call="fit(law, runs)")
     if not runs:
@@ -153,7 +152,10 @@ def _with_estimated_states(
 def not_chosen(model: Model | VehicleTest, over: Sequence[str] | None, *beside: str) -> list[str]:
     """Paths of the law or the vehicle that `over` leaves out; all others, which begin with these words, stay free."""
     paths = [p.path for p in parameters(model) if not p.path.startswith(beside)]
-    chosen = paths if over is None else match_paths(paths, name_patterns("over", over))
+    if over is None:
+        return []
+    names = name_patterns("over", over) if isinstance(model, VehicleTest) else law_names(model).find("over", over)
+    chosen = match_paths(paths, names)
     return [path for path in paths if path not in chosen]
 
 
