@@ -191,7 +191,6 @@ def settings_apart(runs: Sequence[BenchRun]) -> tuple[dict[str, str], str]:
         (what, settings)
         for what, settings in _candidates(runs)
         if all(settings[first] != settings[second] for first, second in apart)
-        and (len(set(settings.values())) < len(runs) or len(runs) == 2)
     ]
     if not kinds:
         said = "they are not pooled but stand one by one, since neither names nor settings tell them apart. "
@@ -202,23 +201,36 @@ def settings_apart(runs: Sequence[BenchRun]) -> tuple[dict[str, str], str]:
 
 
 def _candidates(runs: Sequence[BenchRun]) -> list[tuple[str, dict[str, str]]]:
-    """What may tell records apart: each setting that all of them state, and each word of their names, from the last."""
+    """What may tell records apart: settings that all of them state, words of their names, settings in their names.
+
+    What differs from record to record, such as a running number, tells nothing, unless it is written as an adjuster is.
+    """
     words = {run.name: re.split(r"[_\s,;()]+|-(?=\D)", run.name) for run in runs}
     places = range(-1, -min(map(len, words.values())) - 1, -1)
     named = [("a word of their names", {name: parts[i] for name, parts in words.items()}) for i in places]
-    stated, read = _stated(runs)
-    return [*stated, *named, *read]
+    shared = [
+        (what, settings)
+        for what, settings in (*_stated(runs), *named)
+        if len(set(settings.values())) < len(runs) or len(runs) == 2 or all(map(settings_in_name, settings.values()))
+    ]
+    return [*shared, *_in_names(runs)]
 
 
-def _stated(runs: Sequence[BenchRun]) -> list[list[tuple[str, dict[str, str]]]]:
-    """The settings that all records state: those from elsewhere, and those that were read from their names."""
-    divided: list[list[tuple[str, dict[str, str]]]] = [[], []]
-    read = [settings_in_name(run.name) for run in runs]
-    for key in runs[0].settings:
-        if all(key in run.settings for run in runs):
-            of_names = all(names.get(key) == run.settings[key] for names, run in zip(read, runs, strict=True))
-            divided[of_names].append((f"`{key}`", {run.name: f"{run.settings[key]}" for run in runs}))
-    return divided
+def _stated(runs: Sequence[BenchRun]) -> list[tuple[str, dict[str, str]]]:
+    """The settings that all records state, without those that were read from their names."""
+    keys = [key for key in runs[0].settings if all(key in run.settings for run in runs)]
+    keys = [key for key in keys if any(settings_in_name(run.name).get(key) != run.settings[key] for run in runs)]
+    return [(f"`{key}`", {run.name: f"{run.settings[key]}" for run in runs}) for key in keys]
+
+
+def _in_names(runs: Sequence[BenchRun]) -> list[tuple[str, dict[str, str]]]:
+    """The settings that all names state, one by one and together."""
+    found = {run.name: settings_in_name(run.name) for run in runs}
+    keys = [key for key in found[runs[0].name] if all(key in settings for settings in found.values())]
+    single = [(f"`{key}`", {name: f"{settings[key]:g}" for name, settings in found.items()}) for key in keys]
+    short = {key: key.removesuffix("_clicks") for key in keys}
+    words = {name: " ".join(f"{short[key]} {settings[key]:g}" for key in keys) for name, settings in found.items()}
+    return [*single, *([(" and ".join(f"`{key}`" for key in keys), words)] if len(keys) > 1 else [])]
 
 
 def by_number(text: str) -> tuple[float, str]:

@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 
 from jaxdamp import _checks
 from jaxdamp._triangles import rows_of_products
-from jaxdamp.parameters import Bounds, FreeParameters, match_paths, name_patterns
+from jaxdamp.parameters import Bounds, FreeParameters, match_paths
 from jaxdamp.solve import Linearisation
 
 
@@ -91,7 +91,7 @@ def legendre(setting: np.ndarray, ends: tuple[float, float], count: int) -> np.n
 
 def dependence(
     free: FreeParameters,
-    shared: Mapping[str, int] | Sequence[str],
+    shared: Mapping[str, int],
     settings: Sequence[float | int] | None,
     dampers: int,
 ) -> Dependence | None:
@@ -116,9 +116,8 @@ def dependence(
     return Dependence(degree, legendre(number, ends, most + 1), column, size, ends)
 
 
-def _degrees(free: FreeParameters, shared: Mapping[str, int] | Sequence[str]) -> Int[np.ndarray, " free"]:
+def _degrees(free: FreeParameters, degrees: Mapping[str, int]) -> Int[np.ndarray, " free"]:
     """The degree of each number in the setting, `OWN` where every damper has its own."""
-    degrees = dict(shared) if isinstance(shared, Mapping) else dict.fromkeys(name_patterns("shared", shared), 0)
     degree = np.full(len(free.names), OWN)
     for name, d in degrees.items():
         if not isinstance(d, int) or d < 0:

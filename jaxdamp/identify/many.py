@@ -28,11 +28,11 @@ from jaxdamp.identify.many_blocks import fit_into_store
 from jaxdamp.identify.many_judging import judged, physical
 from jaxdamp.identify.many_records import Options, begun_on, by_name, fitted_records, refuse_several_laws
 from jaxdamp.identify.many_result import ManyFits
-from jaxdamp.identify.model import initial_state_for, rig_of
+from jaxdamp.identify.model import initial_state_for, law_names, rig_of
 from jaxdamp.identify.preparing import weights
 from jaxdamp.identify.several import other_starts
 from jaxdamp.identify.starting import Start
-from jaxdamp.parameters import Coordinates, FreeParameters
+from jaxdamp.parameters import Coordinates, FreeParameters, name_patterns
 from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, SearchLanes, least_squares_on_host
 
 
@@ -135,7 +135,10 @@ def fit_many(
     begun, _, model, _, free = begun_on(law, some, how, shared)
     for name, runs in zip(names, records, strict=True):
         refuse_several_laws(name, runs, model, how)
-    depends = dependence(free, shared, stated, len(names))
+    named = law_names(model)
+    priors = named.find_keys("priors", priors)
+    degrees = shared if isinstance(shared, Mapping) else dict.fromkeys(name_patterns("shared", shared), 0)
+    depends = dependence(free, named.find_keys("shared", degrees), stated, len(names))
     how |= {"bad_records": "keep"}
     many = functools.partial(ManyFits, names, tuple(records), stated, free=free, options=how)
     initial_state = initial_state_for(model, initial_state)

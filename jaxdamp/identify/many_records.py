@@ -10,7 +10,7 @@ from jaxdamp.bench import BenchRun, DamperRecords, as_runs, usable
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.contradicting import contradicting, refuse_contradicting
 from jaxdamp.identify.machine import absent_paths, started_on
-from jaxdamp.identify.model import Model, on_rig
+from jaxdamp.identify.model import Model, law_names, on_rig
 from jaxdamp.identify.starting import Start
 from jaxdamp.identify.stated import start_paths, stated_parameters, stated_values
 from jaxdamp.parameters import FreeParameters, free_parameters
@@ -61,7 +61,8 @@ def refuse_several_laws(name: str, runs: tuple[BenchRun, ...], model: Model, opt
     """
     if paths := list(stated_parameters(model, runs)):
         remedy = "Fit such dampers one by one, with `fit`, or leave this setting out."
-        _checks.refuse(f"dampers[{name!r}]", "have records that state no parameter of the law", ", ".join(paths), remedy)
+        must = "have records that state no parameter of the law"
+        _checks.refuse(f"dampers[{name!r}]", must, ", ".join(paths), remedy)
     if options["bad_records"] != "keep" and options["initial_state"] != "estimated":
         refuse_contradicting(contradicting(model, runs), f"dampers[{name!r}]")
 
@@ -91,7 +92,9 @@ def begun_on(law: Start, runs: Sequence[BenchRun], options: Options, shared: Ite
     model = on_rig(begun, machine)
     stated = stated_values(model, runs)  # temperatures that the records begin with
     held = (*held, *(path for path in start_paths(model) if path in stated))
-    freeze = (*options["freeze"], *absent_paths(machine), *held)
-    free = free_parameters(model, freeze=freeze, bounds=bounds, tie=tie)
+    names = law_names(model)
+    freeze = (*names.find("freeze", options["freeze"]), *absent_paths(machine), *held)
+    limits, tied = names.find_keys("bounds", bounds), names.find_keys("tie", tie)
+    free = free_parameters(model, freeze=freeze, bounds=limits, tie=tied)
     _checks.finite("law", free.values)
     return Beginning(begun, machine, model, (*options["freeze"], *held), free)

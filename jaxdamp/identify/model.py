@@ -1,23 +1,36 @@
 """What explains records: a law, a law on a machine that adds to its force, a vehicle with its sensors."""
 
 import dataclasses
-from collections.abc import Sequence
-from typing import Any, final
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple, TypeVar, final
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from jaxdamp import _checks
 from jaxdamp._types import Scalar, State, Vector
 from jaxdamp.bench import BenchRun, initial_temperature
 from jaxdamp.dampers import AbstractDamper, FittedRange, with_fitted_range, without_standard_errors
 from jaxdamp.identify.initial_states import Cycle, periodic_state
-from jaxdamp.parameters import AbstractDeclared, FreeParameters, Module, get, parameter, readable, with_values
+from jaxdamp.parameters import (
+    AbstractDeclared,
+    FreeParameters,
+    Module,
+    get,
+    matching,
+    name_patterns,
+    parameter,
+    parameters,
+    readable,
+    with_values,
+)
 from jaxdamp.rig import Followed, Rig, Sensor, march
 from jaxdamp.vehicles import AbstractVehicle
 
 
+Given = TypeVar("Given")
 STARTS = "records."  # with which the paths of the states at the beginning of records begin
 
 
@@ -90,6 +103,67 @@ def fitted_part(model: Any) -> Any:
 def on_rig(law: AbstractDamper, rig: Rig | None, records: Sequence[RecordStart | None] = ()) -> Model:
     """The law, on the machine if there is one, with the beginnings of the records if they are estimated."""
     return law if rig is None and not records else OnRig(law, rig, tuple(records))
+
+
+class LawNames(NamedTuple):
+    """Names of parameters as they stand for a law alone, found beside a machine, where they begin with "law."."""
+
+    alone: list[str]  # the paths of the law
+    beside: list[str]  # those of law and machine
+
+    def find(self, argument: str, names: Iterable[str]) -> list[str]:
+        """The names, with "law." before those that are a whole path of the law.
+
+        Without it the last part of another path would count too: "stiffness" is that of a `SeriesSpring` alone.
+
+        Arguments:
+            argument: that the names were given for, in messages.
+            names: names and patterns.
+
+        Raises:
+            ValueError: a name or pattern that is one thing for the law alone and another beside the machine, such as
+                "law.lag_time" of `Lag(Lag(law))`.
+        """
+        return [self._one(argument, name) for name in name_patterns(argument, names)]
+
+    def find_keys(self, argument: str, given: Mapping[str, Given] | None) -> Mapping[str, Given]:
+        """A mapping by name with the names that `find` returns, also as values (ties); empty for none.
+
+        Arguments:
+            argument: as in `find`.
+            given: values by names and patterns.
+        """
+        if not given:
+            return {}
+        if not isinstance(given, Mapping):
+            return given  # refused in words of its own where it is used
+        values = [self._one(argument, value) if isinstance(value, str) else value for value in given.values()]
+        return dict(zip(self.find(argument, list(given)), values, strict=True))  # type: ignore[arg-type]
+
+    def _one(self, argument: str, name: str) -> str:
+        if not self.alone:
+            return name
+        if name in self.alone and name not in self.beside:
+            return f"law.{name}"
+        short = [f"law.{path}" for path in matching(self.alone, name)]
+        long = [path for path in matching(self.beside, name) if path.startswith("law.")]
+        if short and long and short != long:
+            remedy = f"It is {', '.join(short)} of the law, but {', '.join(long)} beside a machine, where all paths of"
+            single = f"Write {long[0].removeprefix('law.')!r} or {short[0]!r}."
+            remedy += f' the law begin with "law.". {"Write the names that you mean." if "*" in name else single}'
+            _checks.refuse(argument, "have names with one meaning", repr(name), remedy)
+        return name
+
+
+def law_names(model: Model) -> LawNames:
+    """How names of the law of a model are found in it.
+
+    Arguments:
+        model: a law, alone or on a machine.
+    """
+    law = law_of(model)
+    known = [] if law is model else [[p.path for p in parameters(tree)] for tree in (law, model)]
+    return LawNames(*known or ([], []))
 
 
 def starts_in(model: Model) -> tuple[RecordStart | None, ...]:

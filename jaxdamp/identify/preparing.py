@@ -23,6 +23,7 @@ from jaxdamp.identify.model import (
     can_rest,
     initial_state_for,
     is_memoryless,
+    law_names,
     law_of,
     on_rig,
     rig_of,
@@ -32,7 +33,7 @@ from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.identify.stated import stated_parameters, stated_values, with_stated
 from jaxdamp.identify.traces import batches, owners, places
-from jaxdamp.parameters import free_parameters, match_paths, matching, name_patterns, parameters, with_values
+from jaxdamp.parameters import free_parameters, match_paths, name_patterns, parameters, with_values
 
 
 FIT_OUTSIDE = "Call it outside `jax.jit`, `jax.grad` and `jax.vmap`; the residuals of a `Problem` can be traced."
@@ -85,27 +86,29 @@ def prepare(
     """
     _checks.one_of("initial_state", initial_state, INITIAL_STATES)
     _checks.untraced("law", law, FIT_OUTSIDE)
-    runs = as_runs(runs, call="fit(law, runs)")
-    if not runs:
-        _checks.refuse("runs", "hold at least one record", "empty", "Read some with `bench.read`.")
-    if not any(np.ptp(run.force) > 0 for run in runs):
-        _checks.refuse("runs", "hold a force that varies", "records of a constant force", "Check the force channel.")
+    runs = _records(runs)
     sigma = weights(weighting, runs)
     fitted_to = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
-    named = [*name_patterns("per_record", per_record), *(bounds or ()), *(priors or ()), *(tie or {})]
-    begin, machine, held = started_on(law, fitted_to, rig, named)
+    stated = [*name_patterns("per_record", per_record), *(bounds or ()), *(priors or ()), *(tie or {})]
+    begin, machine, held = started_on(law, fitted_to, rig, stated)
     model, absent = on_rig(begin, machine), [*absent_paths(machine), *held]
     initial_state = initial_state_for(model, initial_state)
     expected: tuple[Priors, ...] = ()
     if initial_state == "estimated":
         model, expected, unfitted = _with_estimated_states(model, runs, sigma)
         absent = [*absent, *unfitted]
-    _refuse_two_readings(model, freeze=freeze, per_record=per_record, over=over, bounds=bounds, priors=priors, tie=tie)
+    named = law_names(model)
     stated = stated_values(model, runs)
     model = with_stated(model, stated_parameters(model, fitted_to))
-    own = _per_record(model, per_record, sigma, absent, stated)
-    frozen = [*name_patterns("freeze", freeze), *frozen_by(law), *absent, *not_chosen(model, over, "rig.", STARTS)]
+    own = _per_record(model, named.find("per_record", per_record), sigma, absent, stated)
+    left = not_chosen(model, over, "rig.", STARTS)
+    frozen = [*named.find("freeze", freeze), *named.find("freeze", frozen_by(law)), *absent, *left]
     frozen += [p.path for p in parameters(model) if p.path in stated]
+    bounds, priors, tie = (
+        named.find_keys("bounds", bounds),
+        named.find_keys("priors", priors),
+        named.find_keys("tie", tie),
+    )
     free = free_parameters(_spread(model, own, len(runs)), freeze=frozen, bounds=bounds, tie=tie)
     _checks.finite("law", free.values)
     residuals, ranges = batches(model, runs, sigma, samples_per_cycle, own, initial_state)
@@ -122,6 +125,16 @@ def prepare(
     return Problem(
         free, (*residuals, *known), level, runs, sigma, owner, reach, begin, own, each, steps, where, initial_state
     )
+
+
+def _records(runs: BenchRun | Iterable[BenchRun]) -> tuple[BenchRun, ...]:
+    """The records, at least one, whose forces are not all constant."""
+    runs = as_runs(runs, call="fit(law, runs)")
+    if not runs:
+        _checks.refuse("runs", "hold at least one record", "empty", "Read some with `bench.read`.")
+    if not any(np.ptp(run.force) > 0 for run in runs):
+        _checks.refuse("runs", "hold a force that varies", "records of a constant force", "Check the force channel.")
+    return runs
 
 
 def _with_estimated_states(
@@ -141,26 +154,13 @@ def _with_estimated_states(
     return on_rig(law_of(model), rig_of(model), starts), (prior,), [str(path) for path in paths[~fitted]]
 
 
-def _refuse_two_readings(model: Model, **given: Iterable[str] | None) -> None:
-    """Refuse a pattern such as "law.*" that beside a machine stands for other numbers than for the law alone.
-
-    All paths of a law on a machine begin with "law.", as do those of a law in a wrapper by themselves.
-    """
-    law = law_of(model)
-    beside, alone = ([p.path for p in parameters(tree)] for tree in (model, law))
-    for argument, patterns in given.items() if law is not model else ():
-        for pattern in [patterns] if isinstance(patterns, str) else patterns or ():
-            long, short = matching(beside, pattern), [f"law.{path}" for path in matching(alone, pattern)]
-            if "*" in pattern and pattern.startswith("law.") and short and long != short:
-                remedy = f"It is {', '.join(short)} of the law, but {', '.join(long)} beside a machine, where all paths"
-                remedy += ' of the law begin with "law.". Write the names that you mean.'
-                _checks.refuse(argument, "be patterns with one meaning", repr(pattern), remedy)
-
-
 def not_chosen(model: Model | VehicleTest, over: Sequence[str] | None, *beside: str) -> list[str]:
     """Paths of the law or the vehicle that `over` leaves out; all others, which begin with these words, stay free."""
     paths = [p.path for p in parameters(model) if not p.path.startswith(beside)]
-    chosen = paths if over is None else match_paths(paths, name_patterns("over", over))
+    if over is None:
+        return []
+    names = name_patterns("over", over) if isinstance(model, VehicleTest) else law_names(model).find("over", over)
+    chosen = match_paths(paths, names)
     return [path for path in paths if path not in chosen]
 
 

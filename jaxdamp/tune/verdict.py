@@ -57,11 +57,13 @@ class Verdict(NamedTuple):
 
 def verdict_of(result: "TuneResult[Any]") -> Verdict:
     """The verdict on a tuning: on fresh roads if there are any, otherwise on the road of the tuning."""
+    outside = f" by the law, but outside its records ({'; '.join(result.extrapolated)})" * bool(result.extrapolated)
+    gain, words = _change(result)
+    words += outside
     if result.violated:
         missed = "; ".join(result.violated.values())
-        return Verdict(Outcome.LIMIT_NOT_MET, f"Limit not met: {missed}. {_change(result)[1]}.")
+        return Verdict(Outcome.LIMIT_NOT_MET, f"Limit not met: {missed}. {words}.")
     price, name = _price(result)
-    gain, words = _change(result)
     cost = f"; price: {name} {price:+.1f} %" if name else "; nothing else gets worse"
     held = _limits_in_words(result)
     error = 0.0 if result.fresh is None else 100.0 * result.fresh.half_width(result.metric)
@@ -73,9 +75,7 @@ def verdict_of(result: "TuneResult[Any]") -> Verdict:
     elif not gain + error < -NOTICED:
         outcome, first = Outcome.NOT_SHOWN, f"Not shown to be better: {words}"
     elif result.extrapolated:
-        outside = "; ".join(result.extrapolated)
-        outcome = Outcome.EXTRAPOLATED
-        first = f"Not known to be better: {words} by the law, but outside its records ({outside})"
+        outcome, first = Outcome.EXTRAPOLATED, f"Not known to be better: {words}"
     elif name and price > -gain:
         outcome, first = Outcome.TRADE, f"A trade: {words}"
     else:

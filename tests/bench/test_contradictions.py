@@ -5,7 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from jaxdamp.bench import RandomTest, SineTest, VirtualDyno, contradictions, contradictions_in_words, preflight, read
+from jaxdamp.bench import (
+    RandomTest,
+    SineTest,
+    VirtualDyno,
+    contradictions,
+    contradictions_in_words,
+    preflight,
+    read,
+    settings_apart,
+)
 from jaxdamp.dampers import Heated, Linear, Scheduled
 from jaxdamp.identify import compare, fit, fit_many, fit_scheduled
 from jaxdamp.parameters import get
@@ -27,6 +36,25 @@ def test_another_setting_is_named_with_its_size():
     assert 0.0 < found.scatter < 10.0
     (sentence,) = contradictions_in_words([found])
     assert "soft and hard by 177 N (49 % of their RMS force" in sentence
+
+
+@pytest.mark.parametrize(
+    ("names", "settings"),
+    [
+        (("soft_0A", "mid_0.5A", "hard_1.0A"), ["0A", "0.5A", "1.0A"]),
+        (
+            ("C2 R1", "C2 R4", "C9 R1"),
+            [f"compression {c} rebound {r}" for c, r in ((2, 1), (2, 4), (9, 1))],
+        ),
+        (("first", "second", "third"), ["first", "second", "third"]),
+    ],
+    ids=["current", "two clickers", "nothing stated"],
+)
+def test_one_record_of_each_setting_is_told_apart_by_its_name_if_that_states_it(names, settings):
+    runs = [record(name, rate) for name, rate in zip(names, (900.0, 1500.0, 2500.0), strict=True)]
+    found, sentence = settings_apart(runs)
+    assert [found[name] for name in names] == settings
+    assert ("neither names nor settings tell them apart" in sentence) == (names[0] == "first")
 
 
 def test_records_of_one_name_are_named_once():

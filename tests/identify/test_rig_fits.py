@@ -255,3 +255,24 @@ def test_a_pattern_with_another_meaning_beside_a_machine_is_refused() -> None:
         free = identify.prepare(law, runs, rig="offset", freeze=[pattern]).free
         assert free.names == [*left, "rig.force_offset"]
     assert identify.prepare(LAW, runs, rig="offset", freeze=["law.*"]).free.names == ["rig.force_offset"]
+
+
+def test_a_whole_path_of_the_law_is_the_same_number_beside_a_machine() -> None:
+    """Two numbers of one name: of the outer law, whose whole path it is, and of the law inside."""
+    runs = records(tests=TESTS[:1])
+    alone = Lag(Lag(LAW, 0.004), 0.006)
+    with_machine = identify.prepare(alone, runs, rig="offset", freeze=["lag_time", "*_rate"])
+    assert with_machine.free.names == ["law.law.lag_time", "rig.force_offset"]
+    bound = identify.prepare(alone, runs, rig="offset", bounds={"lag_time": (5e-3, 7e-3)})  # the inner one is outside
+    assert {"law.lag_time", "law.law.lag_time"} < set(bound.free.names)
+    many = identify.fit_many(alone, {"a": runs, "b": runs}, rig="offset", freeze=["lag_time", "*_rate"], max_steps=1)
+    assert many.free.names == with_machine.free.names
+    both = r"'law\.lag_time'.* It is law\.law\.lag_time of the law, but law\.lag_time beside a machine"
+    for argument in (
+        {"freeze": ["law.lag_time"]},
+        {"bounds": {"law.lag_time": (1e-3, 1e-2)}},
+        {"over": ["law.lag_time"]},
+    ):
+        assert identify.prepare(alone, runs, **argument)
+        with pytest.raises(ValueError, match=both + r".*Write 'lag_time' or 'law\.law\.lag_time'"):
+            identify.prepare(alone, runs, rig="offset", **argument)

@@ -15,6 +15,7 @@ from jaxdamp.identify import Comparison
 from jaxdamp.report import (
     baseline_table,
     bench_report,
+    bench_verdict,
     chain_report,
     fit_report,
     law_evaluation,
@@ -169,3 +170,9 @@ def test_a_page_on_a_tuning(rides: dict[str, Response], tuned: TuneResult) -> No
     tables = (tuned.table(), tuned.parameter_table(), fresh.table())
     assert all(table.to_html(words=True) in page for table in tables)
     assert fresh.summary in page and "not an optimum" not in page
+
+
+def test_a_static_force_that_rounds_to_zero_has_no_sign() -> None:
+    dyno = bench.VirtualDyno(Linear(1500.0), sampling_rate=500.0, gas_force=-0.3)
+    (said_of_all,) = bench_verdict(bench.evaluate(dyno.run([SineTest(0.02, f) for f in (0.2, 2.0)])))
+    assert said_of_all.endswith("without the static force of 0 N.")

@@ -47,6 +47,13 @@ CASES = [
 ]
 
 
+def test_a_verdict_outside_the_records_says_so_also_where_nothing_is_better():
+    for metrics, outcome, words in CASES[2:]:
+        result = made_up(*metrics, extrapolated=("damper at 5 times the velocity of its records, 60 % of the time",))
+        assert result.verdict.outcome is outcome and words in result.verdict.sentence
+        assert "by the law, but outside its records (damper at 5 times" in result.verdict.sentence
+
+
 @pytest.mark.parametrize(("metrics", "outcome", "words"), CASES, ids=[case[1].name for case in CASES])
 def test_the_verdict_is_that_of_the_fresh_roads(metrics, outcome, words):
     result = made_up(*metrics)
