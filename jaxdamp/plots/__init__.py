@@ -11,6 +11,7 @@ from jaxdamp.plots.cards import law_card
 from jaxdamp.plots.changes import tuning
 from jaxdamp.plots.curves import force_velocity, force_velocity_family as force_velocity_family
 from jaxdamp.plots.damper_sheet import damper_sheet as damper_sheet
+from jaxdamp.plots.damping import damping_ratio
 from jaxdamp.plots.errors import cross_validation as cross_validation, ladder
 from jaxdamp.plots.evaluation import (
     evaluation,
@@ -48,6 +49,7 @@ __all__ = [
     "ROLES",
     "STYLE",
     "damper_use",
+    "damping_ratio",
     "evaluation",
     "force_velocity",
     "ladder",
