@@ -22,6 +22,7 @@ from jaxdamp.cli.riding import Driving, beyond_vehicles, headline, unusual
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, read_module, with_law, write_laws
 from jaxdamp.control import Controlled
 from jaxdamp.dampers import AbstractDamper
+from jaxdamp.parameters import match_paths, parameters
 from jaxdamp.report import sweep_report, tuning_report
 from jaxdamp.roads import WhiteRoad
 from jaxdamp.simulation import stationary_notes
@@ -229,12 +230,23 @@ def sweep_command(
         with work.saving("Tables") as draft:
             write_tables(draft, {"sweep": data.jaxdamp.table()})
             data.to_netcdf(draft / "sweep.nc", engine="scipy")
-        at_start = {name: float(value) for name, value in ride().items()} if limits else {}
+        at = _present(car, over)
+        at_start = {name: float(value) for name, value in ride(at if len(at) == len(over) else None).items()}
+        pair = [_metrics_of("metric", word, car, white=white)[0] for word in ("comfort", "grip")]
         marks = {
             "limits": limit_spans(limits, names, at_start),
+            "present": {**at, **at_start},
+            "plane": pair if set(pair) <= set(names) else None,
             "baseline": None if beside is None else dict(ride.of_vehicle(beside)()),
         }
         work.page(sweep_report, data, remarks=remarks, **marks)
+
+
+def _present(car: AbstractVehicle, over: Mapping[str, np.ndarray]) -> dict[str, float]:
+    """The values that the vehicle has of the axes; those left out that stand for several different ones."""
+    known = {p.path: float(p.value) for p in parameters(car) if not np.shape(p.value)}
+    values = {name: {known[path] for path in match_paths(list(known), [name])} for name in over}
+    return {name: value.pop() for name, value in values.items() if len(value) == 1}
 
 
 def _limits_by_metric(limit: Mapping[str, Any], car: AbstractVehicle, *, white: bool) -> dict[str, Any]:

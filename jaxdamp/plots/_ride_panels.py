@@ -99,11 +99,9 @@ def plane(axes: Axes, shown: _rides.Rides) -> None:
     if not shown.single:
         arrow = {"arrowstyle": "-|>", "color": _style.AFTER["color"], "linewidth": 1.4, "shrinkA": 5, "shrinkB": 6}
         axes.annotate("", places[1], places[0], arrowprops=arrow)
-        axes.plot(
-            *places[0], "o", color=_style.BLACK, markersize=8, label=_style.in_words(shown.names[0]), linestyle=""
-        )
+        axes.plot(*places[0], **_style.PRESENT, label=_style.in_words(shown.names[0]), linestyle="")
     label = _style.in_words(shown.names[1])
-    axes.plot(*places[1], "*", color=_style.AFTER["color"], markersize=14, label=label, linestyle="")
+    axes.plot(*places[1], **_style.BEST, label=label, linestyle="")
     _limits(axes, shown, comfort, grip)
     units = [typeset_unit(shown.units[names[0]]) for names in (comfort, grip)]
     x = f"less comfort →   {_style.metric_words(comfort[0])} [{units[0]}]"

@@ -36,12 +36,12 @@ def gains(axes: Sequence[Axes], shown: _rides.Rides) -> None:
         return
     sides = [(label, style, _gains(shown, number, channels)) for label, style, number in shown.styles()]
     words = _style.metric_words(channels[0]).removesuffix(" acceleration")
-    titles = {channels[0]: f"Transmissibility, road to {words}"} | {channels[-1]: "Tyre load from the road"}
-    for panel, channel in zip(axes, (channels[0], channels[-1]), strict=True):
+    titles = f"Transmissibility, road to {words}\n{_rides.dips(shown)}".strip(), "Tyre load from the road"
+    for panel, channel, title in zip(axes, channels, titles, strict=True):
         for label, style, by_channel in sides:
             panel.loglog(*by_channel[channel], label=label, **style)
         unit = f"[{typeset_unit(shown.cars[0].units[channel])}/mm]" if channel != channels[0] else "[–]"
-        _style.dress(panel, "frequency [Hz]", unit, titles[channel])
+        _style.dress(panel, "frequency [Hz]", unit, title)
         _style.plain_log_axis(panel.xaxis)
         _style.plain_log_axis(panel.yaxis)
         panel.set_xlim(LOWEST, HIGHEST)

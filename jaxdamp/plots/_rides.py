@@ -159,26 +159,32 @@ def _slope(law: Any) -> float:
     return max(float(force[1] - force[0]) / 0.4, 50.0)
 
 
+def element(shown: Rides, path: str, number: int) -> str | None:
+    """The name of a damper by the path of its law, of several with this law the first on its axle; None without one."""
+    car, frame = shown.passive[number], shown.passive[number].frame()
+    law, own = get(car, path), [name for name in frame.element_names if not name.endswith("lift_off")]
+    with_it = [name for name in own if frame.element(name).law is law]
+    return next((n for n in with_it if n.startswith(path.partition(".")[0])), next(iter(with_it), None))
+
+
 def damper_velocity(shown: Rides, path: str, number: int) -> np.ndarray | None:
     """The velocity of a damper over time [m/s]; None where it is not known.
 
     On a white road it is normally distributed: values of equal probability.
     """
+    name = element(shown, path, number)
     if isinstance(shown.road, WhiteRoad):
         motion = equivalent_dampers(shown.cars[number], shown.road.velocity_psd, speed=shown.road.speed)
-        sizes = [float(one.velocity_rms) for name, one in motion.items() if path.replace(".", "_").startswith(name)]
-        return sizes[0] * _NORMAL if sizes and np.isfinite(sizes[0]) else None
-    if shown.responses is None:
-        return None
-    response = shown.responses[number]
-    names = [d for d in response.dampers if path.replace(".", "_").startswith(d)] or list(response.dampers)[:1]
-    return np.asarray(response[f"{names[0]}_velocity"]) if names else None
+        size = float(motion[name].velocity_rms) if name in motion else np.inf
+        return size * _NORMAL if np.isfinite(size) else None
+    response = None if shown.responses is None else shown.responses[number]
+    return None if response is None or name not in response.dampers else np.asarray(response[f"{name}_velocity"])
 
 
 def critical(shown: Rides, path: str, number: int) -> CriticalDamping | None:
     """Critical damping of body and wheel at a damper; None if it is not alone between the two."""
-    found = critical_damping(shown.passive[number])
-    return next((each for name, each in found.items() if path.replace(".", "_").startswith(name)), None)
+    name = element(shown, path, number)
+    return None if name is None else critical_damping(shown.passive[number]).get(name)
 
 
 def quadrants(velocity: np.ndarray | None) -> str:
@@ -199,5 +205,4 @@ def dips(shown: Rides) -> str:
     delays = None if shown.responses is None else shown.responses[0].axle_timing.delays
     if delays is None or len(delays) != 2 or not float(delays[1]):
         return ""
-    dips = (0.5 + np.arange(3)) / float(delays[1])
-    return f" (dips at {', '.join(map(_style.short, dips))} Hz: the axles one after the other)"
+    return f"dips at {', '.join(_style.short((0.5 + i) / float(delays[1])) for i in range(3))} Hz: axle after axle"

@@ -42,6 +42,9 @@ MEASURED: Look = {"color": GREY, "linestyle": "-"}
 BEFORE: Look = {"color": BLACK, "linestyle": "--", "linewidth": 1.3, "zorder": 2.5}
 AFTER: Look = {"color": COLOURS[0], "linestyle": "-", "linewidth": 2.0}
 REFERENCE: Look = {"color": "#949494", "linestyle": "-", "linewidth": 3.5, "zorder": 1.5}
+# Points: the design that there is, and the best one.
+PRESENT: Look = {"marker": "o", "color": BLACK, "markersize": 8.0, "markeredgecolor": "white"}
+BEST: Look = {"marker": "*", "color": COLOURS[0], "markersize": 14.0}
 LIMIT: Look = {"color": BAD, "linestyle": "--", "linewidth": 1.2}
 REBOUND, COMPRESSION = COLOURS[0], COLOURS[1]  # where both are on one axis
 FRONT, REAR = "-", "-."
