@@ -25,7 +25,7 @@ from jaxdamp.plots.frequency import (
     modes,
 )
 from jaxdamp.plots.fronts import pareto
-from jaxdamp.plots.loops import fit_loops as fit_loops, vehicle_fit as vehicle_fit
+from jaxdamp.plots.loops import fit_loops as fit_loops, loops_by_law as loops_by_law, vehicle_fit as vehicle_fit
 from jaxdamp.plots.many_values import (
     damper_comparison as damper_comparison,
     many_fits as many_fits,

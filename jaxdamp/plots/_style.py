@@ -1,5 +1,6 @@
 """House style of all pictures: what each colour means, names and digits for people, axes, legends, titles."""
 
+import functools
 import re
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -27,6 +28,7 @@ from jaxdamp.dampers import law_name as law_name
 if TYPE_CHECKING:
     import matplotlib.axis
     import matplotlib.lines
+    import matplotlib.text
 
 
 Look = dict[str, Any]  # keywords of a line, patch or text
@@ -196,15 +198,50 @@ def dress(axes: Axes, x: str, y: str, title: str = "") -> None:
     The numbers drawn are those of the library: where the labels name a unit that is shown otherwise, the ticks are
     round numbers of the other unit, and an axis of the other sign runs the other way.
     """
-    axes.set_xlabel(display().text(x))
-    axes.set_ylabel(display().text(y))
+    _wrap(axes.set_xlabel(display().text(x)), axes)
+    _wrap(axes.set_ylabel(display().text(y)), axes)
     for axis, label in ((axes.xaxis, x), (axes.yaxis, y)):
         _rescale(axis, label)
     if title:
-        axes.set_title(display().words(title), loc="left", fontsize="medium")
+        _wrap(axes.set_title(display().words(title), loc="left", fontsize="medium"), axes)
     axes.grid(True, color="0.9", linewidth=0.8)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
+
+
+_SLACK = 0.35  # inch, by which a title or label may be longer than its axes
+
+
+def _wrap(text: "matplotlib.text.Text", axes: Axes) -> None:
+    """Break a title or label where it is longer than its axes, as wide as these are when they are drawn."""
+    text.set_wrap(True)
+    vars(text)["_get_wrap_line_width"] = functools.partial(_longest, text, axes)  # by default the width of the figure
+
+
+def _longest(text: "matplotlib.text.Text", axes: Axes) -> float:
+    """Pixels of the longest line of a title or label."""
+    box, page = axes.get_window_extent(), axes.get_figure(root=True).bbox
+    if text.get_rotation():
+        return box.height + _SLACK * axes.get_figure(root=True).dpi
+    room = page.x1 - box.x0 if text.get_horizontalalignment() == "left" else page.width
+    return min(box.width + _SLACK * axes.get_figure(root=True).dpi, room)
+
+
+def few_ticks(axes: Axes, most: int) -> None:
+    """At most so many ticks along the abscissa, and no more than its labels have room for.
+
+    Arguments:
+        axes: of any width.
+        most: ticks.
+    """
+    from matplotlib.ticker import MaxNLocator
+
+    class Ticks(MaxNLocator):
+        def tick_values(self, vmin: float, vmax: float) -> Any:
+            self.set_params(nbins=max(min(most, int(0.6 * axes.xaxis.get_tick_space())), 1))
+            return super().tick_values(vmin, vmax)
+
+    axes.xaxis.set_major_locator(Ticks(steps=[1, 2, 2.5, 5, 10]))
 
 
 def _rescale(axis: "matplotlib.axis.Axis", label: str) -> None:
@@ -249,12 +286,16 @@ def legend_beside(
     figure.legend(handles=list(handles), loc=where, frameon=False, title=title or None, alignment="left")
 
 
-def legend_above(figure: Figure, handles: Sequence[object], columns: int = 3) -> None:
+_LETTERS = 9  # in an inch of a legend, with room for narrower figures
+
+
+def legend_above(figure: Figure, handles: Sequence[Any], columns: int = 3) -> None:
     """A legend above all axes, for pictures that need their width."""
     _in_words(handles)
-    figure.legend(
-        handles=list(handles), loc="outside upper center", frameon=False, ncols=min(columns, max(len(handles), 1))
-    )
+    letters = max((len(line) for handle in handles for line in str(handle.get_label()).split("\n")), default=1)
+    room = int(_LETTERS * figure.get_figwidth() / (letters + 8))  # of so many columns
+    columns = max(min(columns, room, len(handles)), 1)
+    figure.legend(handles=list(handles), loc="outside upper center", frameon=False, ncols=columns)
 
 
 def _in_words(handles: Sequence[Any]) -> None:

@@ -247,7 +247,7 @@ def _dress(panels: Mapping[str, Axes]) -> None:
         if name not in "vx":
             axes.set_ylabel("")
         _style.cross(axes, vertical=name != "t")
-        axes.locator_params(axis="x", nbins=6)
+        _style.few_ticks(axes, 6)
 
 
 def limit_check(check: LimitCheck) -> Figure:
@@ -273,5 +273,5 @@ def limit_check(check: LimitCheck) -> Figure:
     axes.set_yticks(range(len(labels)), labels)
     axes.set_ylim(len(labels) - 0.5, -0.5)
     axes.set_xlabel("value, as a share of the largest of limits and value")
-    figure.suptitle(check.summary)
+    figure.suptitle(check.summary, wrap=True)
     return figure

@@ -133,7 +133,7 @@ def third_octaves(
         shade = {"facecolor": (style["color"], 0.3)} if filled else {}
         axes.stairs(rms[bands], ends, fill=filled, label=label, **look, **shade)
     axes.set_xscale("log")
-    title = f"{_style.first_upper(name)} by third octave,\nweighted by {weighting} (ISO 2631-1)"
+    title = f"{_style.first_upper(name)} by third octave, weighted by {weighting} (ISO 2631-1)"
     _style.dress(axes, "frequency [Hz]", f"[{unit}]", title)
     _style.plain_log_axis(axes.xaxis)
 

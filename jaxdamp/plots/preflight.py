@@ -45,7 +45,7 @@ def preflight(found: Preflight) -> Figure:
     axes.grid(True, which="minor", color="0.9", linewidth=0.8)
     axes.tick_params(which="both", length=0)
     axes.spines[:].set_visible(False)
-    figure.suptitle(_style.said(found.summary))
+    figure.suptitle(_style.said(found.summary), wrap=True)
     _style.legend_beside(figure, [Patch(color=colour, alpha=0.35, label=word) for word, colour in _SHADES.items()])
     return figure
 

@@ -1,6 +1,5 @@
 """A metric over the points of a sweep: curves, or a map."""
 
-import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -16,8 +15,6 @@ from jaxdamp.tune import limit_spans
 
 LEVELS = 14  # of a map
 MOST_CURVES = 6
-LABEL_LENGTH = 36  # characters, of two labels beside each other above a picture
-TITLE_LENGTH = 72  # characters in a line
 PRESENT = {"label": "present", "linestyle": "", "clip_on": False, "zorder": 5.0} | _style.PRESENT
 ON_COLOURS = {"color": "white", "markeredgecolor": _style.BLACK}  # of a mark in a map
 BEST = {"linestyle": "", "clip_on": False, "zorder": 4.5} | _style.BEST | ON_COLOURS
@@ -70,9 +67,8 @@ def sweep(
     over_axes = " and ".join(_words(data, name) for name in axes)
     idle = without_effect(data).get(metric, [])
     flat = f" (no effect of {' and '.join(_words(data, name) for name in idle)})" if idle else ""
-    shown = _words(data, metric) if against is None else f"{_words(data, metric)} and {_words(data, against)}"
-    title = _style.first_upper(f"{shown} over {over_axes}{flat}")
-    plot.set_title("\n".join(textwrap.wrap(title, TITLE_LENGTH)), loc="left", fontsize="medium")
+    what = _words(data, metric) if against is None else "Designs"
+    _style.dress(plot, "", "", _style.first_upper(f"{what} over {over_axes}{flat}"))
     if against is not None:
         if (other := _grid_axes(data, against, "against")) != axes:
             _checks.refuse("against", f"be a result over {axes}", f"{against!r} over {other}")
@@ -142,7 +138,7 @@ def _curves(
         plot.axvline(present[name], color=_style.BLACK, linestyle=":", linewidth=1.0)
         plot.set_xlim(*_widened(where))
     if marks:
-        _style.legend_above(figure, marks, _legend_columns(marks))
+        _style.legend_above(figure, marks, 2)
     if failed.any():
         crossed = where[failed.any(axis=0)]
         foot = np.zeros(len(crossed))
@@ -195,7 +191,7 @@ def _map(
     plot.set_xlim(x.min(), x.max())
     plot.set_ylim(y.min(), y.max())
     handles = [*plot.get_legend_handles_labels()[0], *hatched]
-    _style.legend_above(figure, handles, _legend_columns(handles))
+    _style.legend_above(figure, handles, 2)
 
 
 def _mark_present(
@@ -245,7 +241,7 @@ def _plane(
     if metric in present and against in present:
         handles += plot.plot(present[metric], present[against], **PRESENT)
     _style.dress(plot, _label(data, metric), _label(data, against))
-    _style.legend_above(figure, handles, _legend_columns(handles))
+    _style.legend_above(figure, handles, 2)
 
 
 def _unbeaten(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -263,11 +259,6 @@ def _more_than(plot: Axes, x: np.ndarray, y: np.ndarray, values: np.ma.MaskedArr
         heights = [smallest * (1.0 + share / 100.0) for share in levels]
         lines = plot.contour(x, y, values, heights, colors="white", linewidths=0.8)
         plot.clabel(lines, fmt=dict(zip(heights, map(_style.percent, levels), strict=True)), fontsize="small")
-
-
-def _legend_columns(handles: Sequence[Any]) -> int:
-    """Two, if their labels fit beside each other."""
-    return 2 if max((len(str(handle.get_label())) for handle in handles), default=0) <= LABEL_LENGTH else 1
 
 
 class _End(NamedTuple):
