@@ -79,8 +79,8 @@ STYLE: Mapping[str, Any] = MappingProxyType(
 """The look of the library's pictures for figures of your own: `matplotlib.pyplot.style.use(plots.STYLE)`; "C0" to "C5"
 are then its colours."""
 
-VELOCITY = "velocity [m/s]   (+ rebound, − compression)"
-STROKE = "stroke [mm]   (+ rebound, − compression)"
+VELOCITY = "velocity [m/s]   (+ rebound)"
+STROKE = "stroke [mm]   (+ rebound)"
 FORCE = "force [N]   (+ resists extension)"
 SIMULATE = "Take what `jaxdamp.simulate(vehicle, road)` gives, or several by name: {'before': ..., 'after': ...}."
 

@@ -75,7 +75,8 @@ def fit_loops(result: FitResult, runs: BenchRun | Sequence[BenchRun] | None = No
         Line2D([], [], color=_style.GREY, linewidth=4.0, alpha=0.4, label="measured"),
         Line2D([], [], color=_style.GREY, linewidth=1.3, label="fitted"),
     ]
-    _style.legend_beside(figure, styles + handles, "record (peak velocity)")
+    several = len(shown) > 1  # one has its name in the title
+    _style.legend_beside(figure, styles + handles * several, "record (peak velocity)" * several)
     figure.suptitle(_title(result, runs, shown), x=0.01, ha="left", fontsize="medium")
     return figure
 
@@ -112,14 +113,14 @@ def loops_by_law(comparison: Comparison, record: str | None = None) -> Figure:
         axes.plot(run.velocity[part], force[part], label="law", **_style.AFTER)
         best = ", recommended" * (rung is comparison.best)
         words = f"{_style.in_words(rung.name)}: {_style.short(rung.error)}\N{NO-BREAK SPACE}N{best}"
-        _style.dress(axes, "velocity [m/s]", "force [N]", words)
+        _style.dress(axes, _style.VELOCITY, _style.FORCE, words)
         _style.cross(axes)
         _style.few_ticks(axes, 4)
         axes.label_outer()
     for axes in panels.flat[len(shown) :]:
         axes.set_axis_off()
     for axes in panels.flat[max(len(shown) - columns, 0) : len(shown)]:
-        axes.set_xlabel(display().text("velocity [m/s]"))
+        axes.set_xlabel(display().text(_style.VELOCITY))
         axes.tick_params(labelbottom=True)
     judged = "on motion held out" if comparison.best.judged_on else "on the fitted records"
     few = f", the best {len(shown)} of {len(rungs)} laws" * (len(shown) < len(rungs))
@@ -132,7 +133,7 @@ def _title(result: FitResult, runs: Sequence[BenchRun], shown: Sequence[BenchRun
     own = runs is result.runs
     percent, rmse = (result.fit_percent, result.rmse) if own else result.score(runs)[:2]
     new = not any(run is fitted for run in runs for fitted in result.runs)
-    records = f"{len(runs)} record{'s' * (len(runs) > 1)}{' not fitted' * new}"
+    records = f"{runs[0].name if len(runs) == 1 else f'{len(runs)} records'}{' not fitted' * new}"
     score = f"{_style.law_name(result.law)}: fit {percent:.1f} %, RMSE {_style.short(rmse)} N on {records}"
     return score + (f"\n{len(shown)} of them shown, last full cycle of each" if len(shown) < len(runs) else "")
 

@@ -19,7 +19,7 @@ from jaxdamp.vehicles import ChannelKind, Layout
 WINDOW = 3.0  # s, drawn over time: in more, wheel oscillations at 10 Hz cannot be distinguished
 _WORDS = {
     "sprung_acceleration": "body acceleration [m/s²]   (+ up)",
-    "stroke": "stroke [mm]   (+ rebound)",
+    "stroke": _style.STROKE,
     "dynamic_tyre_load": "dynamic tyre load [N]   (+ more load)",
 }
 
@@ -214,8 +214,8 @@ def damper_use(responses: Response | Mapping[str, Response], *, damper: str | No
     words = f"{_style.first_upper(damper.replace('_', ' '))}: law (thick) and its forces in the ride (thin)"
     _style.dress(trace, _style.VELOCITY, _style.FORCE, words)
     _style.cross(trace)
-    _style.dress(time_share, "velocity [m/s]", "share of time [%]", f"Time, {reach / _BINS * 2:.2g} m/s a step")
-    _style.dress(energy_share, "velocity [m/s]", "share of dissipated energy [%]", "Energy")
+    _style.dress(time_share, _style.VELOCITY, "share of time [%]", f"Time, {reach / _BINS * 2:.2g} m/s a step")
+    _style.dress(energy_share, _style.VELOCITY, "share of dissipated energy [%]", "Energy")
     if len(responses) > 1 or shaded[0]:
         _style.legend_above(figure, handles)
     _style.note_below(figure, gaps)

@@ -42,7 +42,7 @@ def test_force_velocity_draws_each_law_where_asked() -> None:
     np.testing.assert_allclose(_line(axes, "a"), np.stack([velocity, 2000.0 * velocity], axis=1))
     np.testing.assert_allclose(_line(axes, "b")[:, 1], np.where(velocity > 0, 2000.0, 1000.0) * velocity)
     assert (axes.get_xlabel(), axes.get_ylabel()) == (
-        "velocity [m/s]   (+ rebound, − compression)",
+        "velocity [m/s]   (+ rebound)",
         "force [N]   (+ resists extension)",
     )
     labels = {text.get_text(): text.get_color() for text in axes.texts}  # at the ends of the curves, in their colours
