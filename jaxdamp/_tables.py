@@ -72,7 +72,7 @@ def _written(number: Any, spec: str) -> str:
     ['11187', '-1032', '0.00123', '8.818e-05', '0', '0.0']
     """
     text = format(number, spec)
-    if "e" in text and isinstance(number, float | np.floating) and 1e-3 <= abs(number) < 1e5:
+    if "e" in text and not isinstance(number, Shown | int) and 1e-3 <= abs(number) < 1e5:
         text = f"{number:.0f}" if abs(number) >= 1e3 else np.format_float_positional(float(text), trim="-")
     return text[1:] if re.fullmatch(r"[-+]0(\.0*)?", text) else text
 

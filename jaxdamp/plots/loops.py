@@ -113,7 +113,7 @@ def loops_by_law(comparison: Comparison, record: str | None = None) -> Figure:
         axes.plot(run.velocity[part], force[part], label="law", **_style.AFTER)
         best = ", recommended" * (rung is comparison.best)
         words = f"{_style.in_words(rung.name)}: {_style.short(rung.error)}\N{NO-BREAK SPACE}N{best}"
-        _style.dress(axes, _style.VELOCITY, _style.FORCE, words)
+        _style.dress(axes, _style.VELOCITY, "force [N]", words)
         _style.cross(axes)
         _style.few_ticks(axes, 4)
         axes.label_outer()
