@@ -65,7 +65,7 @@ class Column(NamedTuple):
         return display().words(cell) if isinstance(cell, str) else _written(cell, self.spec)
 
 
-def _written(number: Any, spec: str) -> str:
+def _written(number: float, spec: str) -> str:
     """A number in a format, but without a power of ten from 0.001 to 99 999, and without a sign of zero.
 
     >>> [_written(number, ".4g") for number in (11187.4, -1032.4, 0.00123, 8.818e-05, -0.0)] + [_written(-0.04, ".1f")]

@@ -232,14 +232,19 @@ def sweep_command(
             data.to_netcdf(draft / "sweep.nc", engine="scipy")
         at = _present(car, over)
         at_start = {name: float(value) for name, value in ride(at if len(at) == len(over) else None).items()}
-        pair = [_metrics_of("metric", word, car, white=white)[0] for word in ("comfort", "grip")]
         marks = {
             "limits": limit_spans(limits, names, at_start),
             "present": {**at, **at_start},
-            "plane": pair if set(pair) <= set(names) else None,
+            "plane": _comfort_and_grip(car, names, white=white),
             "baseline": None if beside is None else dict(ride.of_vehicle(beside)()),
         }
         work.page(sweep_report, data, remarks=remarks, **marks)
+
+
+def _comfort_and_grip(car: AbstractVehicle, names: Sequence[str], *, white: bool) -> tuple[str, str] | None:
+    """The first metrics of comfort and grip, where both are swept."""
+    comfort, grip = (_metrics_of("metric", word, car, white=white)[0] for word in ("comfort", "grip"))
+    return (comfort, grip) if {comfort, grip} <= set(names) else None
 
 
 def _present(car: AbstractVehicle, over: Mapping[str, np.ndarray]) -> dict[str, float]:

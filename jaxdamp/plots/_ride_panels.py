@@ -178,41 +178,46 @@ def damper(panels: Sequence[Axes], shown: _rides.Rides, path: str) -> None:
         path: of its law.
     """
     curves, *damping, shares = panels
-    laws = [shown.laws(path, number) for number in (0, 1)]
     velocities = [_rides.damper_velocity(shown, path, number) for number in (0, 1)]
     known = [np.abs(v).max() for v in velocities if v is not None]
     reach = 1.05 * float(max(known)) if known else 1.0
-    points = np.linspace(-reach, reach, 401)
-    critical = [_rides.critical(shown, path, number) for number in (0, 1)]
-    heights = []
-    for label, style, number in shown.styles():
-        for law in laws[number]:
-            force = np.asarray(quasi_static(law, points).force)
-            fitted_range.curve(curves, law, points, force, label=label or "law", **style)
-            label = "_"  # the others of a damper at several commands
-            one = critical[number]
-            heights += [ratios(axes, law, one, points, force, **style) for axes in damping if one is not None]
+    several = _draw_law(curves, damping, shown, path, np.linspace(-reach, reach, 401))
+    for _, style, number in shown.styles():
         velocity = velocities[number]
         if velocity is not None:
             edges = np.linspace(-reach, reach, _BINS + 1)
             share = 100.0 * np.asarray(metrics.velocity_histogram(velocity, edges))
             shares.step(0.5 * (edges[1:] + edges[:-1]), share, where="mid", **style)
-    fitted_range.shade(curves, [law for of_one in laws for law in of_one], points)
     _thousandths(*panels)
     title = _style.first_upper(_style.in_words(path).removesuffix(" law"))
-    _style.dress(curves, "", "force [N]", title + ", at all levels of its command" * (len(laws[1]) > 1))
+    _style.dress(curves, "", "force [N]", title + ", at all levels of its command" * several)
     _style.cross(curves)
+    _style.dress(shares, "velocity [mm/s]   (+ rebound)", "time [%]", _rides.quadrants(velocities[1]))
+    curves.set_xlim(-reach, reach)
+    if len(shown.styles()) > 1:
+        drawn = [line for line in curves.get_lines() if not str(line.get_label()).startswith("_")]
+        curves.legend(handles=drawn, frameon=False, loc="upper left")
+    for above in (curves, *damping):
+        above.tick_params(labelbottom=False)
+
+
+def _draw_law(curves: Axes, damping: Sequence[Axes], shown: _rides.Rides, path: str, points: np.ndarray) -> bool:
+    """Force and damping ratio of a law before and after; whether it is drawn at several commands."""
+    laws = [shown.laws(path, number) for number in (0, 1)]
+    critical = [_rides.critical(shown, path, number) for number in (0, 1)]
+    heights = []
+    for label, style, number in shown.styles():
+        for law in laws[number]:
+            force, one = np.asarray(quasi_static(law, points).force), critical[number]
+            fitted_range.curve(curves, law, points, force, label=label or "law", **style)
+            label = "_"  # the others of a damper at several commands
+            heights += [ratios(axes, law, one, points, force, **style) for axes in damping if one is not None]
+    fitted_range.shade(curves, [law for of_one in laws for law in of_one], points)
     for axes in damping:
         _style.dress(axes, "", "body [–]", "Damping ratio")
         axes.set_ylim(0.0, max(heights))
         wheel_axis(axes, [one for one in critical if one is not None])
-    _style.dress(shares, "velocity [mm/s]   (+ rebound)", "time [%]", _rides.quadrants(velocities[1]))
-    curves.set_xlim(-reach, reach)
-    for above in (curves, *damping):
-        above.tick_params(labelbottom=False)
-    if len(shown.styles()) > 1:
-        drawn = [line for line in curves.get_lines() if not str(line.get_label()).startswith("_")]
-        curves.legend(handles=drawn, frameon=False, loc="upper left")
+    return len(laws[1]) > 1
 
 
 def _thousandths(*panels: Axes) -> None:

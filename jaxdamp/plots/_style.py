@@ -223,7 +223,8 @@ def _longest(text: "matplotlib.text.Text", axes: Axes) -> float:
     box, page = axes.get_window_extent(), axes.get_figure(root=True).bbox
     if text.get_rotation():
         return box.height + _SLACK * axes.get_figure(root=True).dpi
-    room = page.x1 - box.x0 if text.get_horizontalalignment() == "left" else page.width
+    middle = 0.5 * (box.x0 + box.x1)
+    room = page.x1 - box.x0 if text.get_horizontalalignment() == "left" else 2.0 * min(middle, page.x1 - middle)
     return min(box.width + _SLACK * axes.get_figure(root=True).dpi, room)
 
 
@@ -237,7 +238,7 @@ def few_ticks(axes: Axes, most: int) -> None:
     from matplotlib.ticker import MaxNLocator
 
     class Ticks(MaxNLocator):
-        def tick_values(self, vmin: float, vmax: float) -> Any:
+        def tick_values(self, vmin: float, vmax: float) -> np.ndarray:
             self.set_params(nbins=max(min(most, int(0.6 * axes.xaxis.get_tick_space())), 1))
             return super().tick_values(vmin, vmax)
 

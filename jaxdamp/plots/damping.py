@@ -46,13 +46,8 @@ def damping_ratio(
     remedy = "Take a vehicle, or several by name: {'before': ..., 'after': ...}."
     cars = _style.by_name("vehicles", vehicles, AbstractVehicle, "a vehicle", remedy)
     critical = {name: critical_damping(car) for name, car in cars.items()}
-    known = [name for name in next(iter(critical.values())) if all(name in each for each in critical.values())]
-    if not known:
-        _checks.refuse("vehicles", "have a damper between a body and a wheel of its own", "vehicles without one")
-    if damper is not None:
-        _checks.one_of("damper", damper, known)
+    shown = _dampers(critical, damper)
     points = np.linspace(-1.0, 1.0, 401) if velocities is None else np.asarray(velocities, dtype=float)
-    shown = known if damper is None else [damper]
     figure = _style.new_figure(max(4.2 * len(shown), 6.0), 4.2)
     panels = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
     styles = _style.ride_styles(list(cars))
@@ -71,6 +66,16 @@ def damping_ratio(
     if len(cars) > 1:
         panels[0].legend(frameon=False)
     return figure
+
+
+def _dampers(critical: Mapping[str, Mapping[str, CriticalDamping]], damper: str | None) -> list[str]:
+    """The dampers to draw, checked: that one, or all that every vehicle has."""
+    known = [name for name in next(iter(critical.values())) if all(name in each for each in critical.values())]
+    if not known:
+        _checks.refuse("vehicles", "have a damper between a body and a wheel of its own", "vehicles without one")
+    if damper is not None:
+        _checks.one_of("damper", damper, known)
+    return known if damper is None else [damper]
 
 
 def ratios(

@@ -202,14 +202,9 @@ def _draw_forces(axes: Axes, evaluation: Evaluation, styles: Mapping[str, Mappin
     is named at the end of its line, which is returned.
     """
     ends: list = []
-    for setting, runs in evaluation.settings.items():
-        values = {(m.quantity, m.record): m.value for m in evaluation.measurements}
+    for setting in evaluation.settings:
         for side in ("rebound", "compression"):
-            pairs = sorted((values[f"{side} velocity", run.name], values[f"{side} force", run.name]) for run in runs)
-            if slow := evaluation.gas_and_friction.get(setting):
-                sign = 1.0 if side == "rebound" else -1.0
-                pairs = sorted([*pairs, (0.0, slow.gas_force + sign * slow.friction)])
-            velocity, force = np.array(pairs).T
+            velocity, force = _branch(evaluation, setting, side)
             joined = bool(np.all(np.diff(velocity) > _DISTINCT * np.abs(velocity).max()))
             look = styles[setting] if joined else {**styles[setting], "linestyle": ""}
             peaks = np.flatnonzero(velocity).tolist()
@@ -226,6 +221,17 @@ def _draw_forces(axes: Axes, evaluation: Evaluation, styles: Mapping[str, Mappin
         if stated:
             axes.plot(*np.array(stated).T, "D", markersize=4.5, color=styles[setting]["color"], zorder=3)
     return ends
+
+
+def _branch(evaluation: Evaluation, setting: str, side: str) -> tuple[np.ndarray, np.ndarray]:
+    """Velocities and forces at the peaks of a side, with gas force and friction at rest where they are known."""
+    values = {(m.quantity, m.record): m.value for m in evaluation.measurements}
+    runs = evaluation.settings[setting]
+    pairs = [(values[f"{side} velocity", run.name], values[f"{side} force", run.name]) for run in runs]
+    if slow := evaluation.gas_and_friction.get(setting):
+        pairs.append((0.0, slow.gas_force + (slow.friction if side == "rebound" else -slow.friction)))
+    velocity, force = np.array(sorted(pairs)).T
+    return velocity, force
 
 
 def _draw_limits(axes: Axes, limits: LimitCheck) -> list:

@@ -15,9 +15,9 @@ from jaxdamp.tune import limit_spans
 
 LEVELS = 14  # of a map
 MOST_CURVES = 6
-PRESENT = {"label": "present", "linestyle": "", "clip_on": False, "zorder": 5.0} | _style.PRESENT
-ON_COLOURS = {"color": "white", "markeredgecolor": _style.BLACK}  # of a mark in a map
-BEST = {"linestyle": "", "clip_on": False, "zorder": 4.5} | _style.BEST | ON_COLOURS
+PRESENT: _style.Look = {"label": "present", "linestyle": "", "clip_on": False, "zorder": 5.0} | _style.PRESENT
+ON_COLOURS: _style.Look = {"color": "white", "markeredgecolor": _style.BLACK}  # of a mark in a map
+BEST: _style.Look = {"linestyle": "", "clip_on": False, "zorder": 4.5} | _style.BEST | ON_COLOURS
 HATCHES = ("////", "\\\\\\\\", "xxxx", "....")
 
 
@@ -184,8 +184,7 @@ def _map(
         plot.patch.set(facecolor="0.95", edgecolor="0.75", hatch="///")
         rows, columns = np.nonzero(failed)
         plot.plot(x[columns], y[rows], "x", color=_style.BLACK, markersize=4.0, label="failed", clip_on=False)
-    if all(name in present for name in over):
-        _mark_present(plot, data, over, present, tuple(present[name] for name in over))
+    _mark_present(plot, data, over, present, tuple(present.get(name, np.nan) for name in over))
     _style.dress(plot, _label(data, over[0]), _label(data, over[1]))
     plot.grid(False)
     plot.set_xlim(x.min(), x.max())
@@ -197,7 +196,9 @@ def _map(
 def _mark_present(
     plot: Axes, data: Dataset, over: list[str], present: Mapping[str, float], place: tuple[float, ...]
 ) -> list:
-    """A filled circle at the present design, or a word in the legend that it is outside the grid."""
+    """A filled circle at the present design if it is known, or words in the legend that it is outside the grid."""
+    if not all(name in present for name in over):
+        return []
     if all(data[name].min() <= present[name] <= data[name].max() for name in over):
         return plot.plot(*place, **PRESENT)
     where = ", ".join(f"{_style.short(present[name])}{_unit(data, name)}" for name in over)

@@ -3,12 +3,13 @@
 from typing import NamedTuple
 
 import jax.numpy as jnp
+import numpy as np
 
 from jaxdamp._field_types import check_module
 from jaxdamp._limits import root
 from jaxdamp._types import Scalar
 from jaxdamp.vehicles.base import AbstractVehicle
-from jaxdamp.vehicles.frame import STANDARD_GRAVITY
+from jaxdamp.vehicles.frame import STANDARD_GRAVITY, Frame
 from jaxdamp.vehicles.parts import Link, prefixed
 from jaxdamp.vehicles.port_form import Ports
 
@@ -45,18 +46,13 @@ def critical_damping(vehicle: AbstractVehicle) -> dict[str, CriticalDamping]:
     """
     check_module("vehicle", vehicle, (AbstractVehicle,), "critical_damping(vehicle)")
     frame = vehicle.frame()
-    laws = [element.together for part in (*frame.links, *frame.wheels) for element in part.elements]
-    slopes = jnp.zeros(len(laws))
-    if any(law.traits().stroke_dependent_at_rest for law in laws):
-        slopes, _ = Ports(laws).stiffness_and_damping(slopes)
-    loads, pairs, place = frame.static_wheel_loads(), {}, 0
+    loads, springs = frame.static_wheel_loads(), _springs(frame)
     on_road = [{name for name in wheel.point.terms if name[:2] == "z_"} for wheel in frame.wheels]
     lower = [_lower_end(link, set().union(*on_road)) for link in frame.links]
-    for link, end in zip(frame.links, lower, strict=True):
-        spring = link.stiffness + jnp.sum(slopes[place : place + len(link.elements)])
-        place += len(link.elements)
+    pairs = {}
+    for link, end, spring in zip(frame.links, lower, springs, strict=True):
         wheels = [i for i, heights in enumerate(on_road) if end in heights]
-        if not link.elements or not wheels or lower.count(end) > 1:
+        if not wheels or lower.count(end) > 1:
             continue
         mass = frame.body(end.removeprefix("z_")).mass
         carried = sum(loads[i] for i in wheels) / STANDARD_GRAVITY - mass
@@ -66,6 +62,16 @@ def critical_damping(vehicle: AbstractVehicle) -> dict[str, CriticalDamping]:
             name = prefixed(link.name, element.name)
             pairs[name] = CriticalDamping(*(size / element.count for size in sizes))
     return pairs
+
+
+def _springs(frame: Frame) -> list[Scalar]:
+    """The stiffness of each link, with that of its laws at rest [N/m]."""
+    laws = [element.together for part in (*frame.links, *frame.wheels) for element in part.elements]
+    slopes = jnp.zeros(len(laws))
+    if any(law.traits().stroke_dependent_at_rest for law in laws):
+        slopes, _ = Ports(laws).stiffness_and_damping(slopes)
+    ends = np.cumsum([0, *(len(link.elements) for link in frame.links)])
+    return [link.stiffness + jnp.sum(slopes[ends[i] : ends[i + 1]]) for i, link in enumerate(frame.links)]
 
 
 def _lower_end(link: Link, on_road: set[str]) -> str:
