@@ -220,12 +220,14 @@ def _wrap(text: "matplotlib.text.Text", axes: Axes) -> None:
 
 def _longest(text: "matplotlib.text.Text", axes: Axes) -> float:
     """Pixels of the longest line of a title or label."""
-    box, page = axes.get_window_extent(), axes.get_figure(root=True).bbox
+    figure = text.get_figure(root=True)
+    assert figure is not None
+    box, page, slack = axes.get_window_extent(), figure.bbox, _SLACK * figure.dpi
     if text.get_rotation():
-        return box.height + _SLACK * axes.get_figure(root=True).dpi
+        return box.height + slack
     middle = 0.5 * (box.x0 + box.x1)
     room = page.x1 - box.x0 if text.get_horizontalalignment() == "left" else 2.0 * min(middle, page.x1 - middle)
-    return min(box.width + _SLACK * axes.get_figure(root=True).dpi, room)
+    return min(box.width + slack, room)
 
 
 def few_ticks(axes: Axes, most: int) -> None:
@@ -238,7 +240,7 @@ def few_ticks(axes: Axes, most: int) -> None:
     from matplotlib.ticker import MaxNLocator
 
     class Ticks(MaxNLocator):
-        def tick_values(self, vmin: float, vmax: float) -> np.ndarray:
+        def tick_values(self, vmin: float, vmax: float) -> "Sequence[float]":
             self.set_params(nbins=max(min(most, int(0.6 * axes.xaxis.get_tick_space())), 1))
             return super().tick_values(vmin, vmax)
 

@@ -104,5 +104,7 @@ def wheel_axis(axes: Axes, critical: list[CriticalDamping]) -> None:
     shares = np.array([float(each.body) / float(each.wheel) for each in critical])
     if np.ptp(shares) <= _SAME * shares[-1]:
         share = float(shares[-1])
-        wheel = axes.secondary_yaxis("right", functions=(lambda ratio: share * ratio, lambda ratio: ratio / share))
+        wheel = axes.secondary_yaxis(
+            "right", functions=(lambda z: np.multiply(z, share), lambda z: np.divide(z, share))
+        )
         wheel.set_ylabel("wheel [–]")

@@ -130,7 +130,7 @@ def third_octaves(
         ends = np.append(centre[bands] * 10.0**-0.05, centre[bands][-1:] * 10.0**0.05)
         look = {name: value for name, value in style.items() if name != "color"} | {"edgecolor": style["color"]}
         filled = number == len(sides) - 1
-        shade = {"facecolor": (style["color"], 0.3)} if filled else {}
+        shade: _style.Look = {"facecolor": (style["color"], 0.3)} if filled else {}
         axes.stairs(rms[bands], ends, fill=filled, label=label, **look, **shade)
     axes.set_xscale("log")
     title = f"{_style.first_upper(name)} by third octave, weighted by {weighting} (ISO 2631-1)"

@@ -70,7 +70,7 @@ def _points(axes: Axes, front: ParetoFront, x: str, y: str, marked: Mapping[str,
     )  # fmt: skip
     handles = [points, knee]
     for i, (name, values) in enumerate(marked.items()):
-        mark = {"color": _style.COLOURS[(i + 1) % len(_style.COLOURS)], "marker": MARKS[i % len(MARKS)]}
+        mark: _style.Look = {"color": _style.COLOURS[(i + 1) % len(_style.COLOURS)], "marker": MARKS[i % len(MARKS)]}
         look = mark | (_style.PRESENT if i == 0 else {})
         handles += axes.plot(values[x], values[y], label=_style.in_words(name), linestyle="", zorder=4, **look)
     handles += _limits(axes, front, x, y)

@@ -238,7 +238,8 @@ def _plane(
         handles += plot.plot(x[forbidden], y[forbidden], "x", color=_style.BAD, markersize=7.0, label=label)
     allowed = np.isfinite(x) & np.isfinite(y) & ~forbidden
     best = _unbeaten(x[allowed], y[allowed])
-    handles += plot.plot(*best, **(_style.AFTER | {"linewidth": 1.2}), marker=".", label="no point is better in both")
+    look: _style.Look = _style.AFTER | {"linewidth": 1.2, "marker": "."}
+    handles += plot.plot(*best, label="no point is better in both", **look)
     if metric in present and against in present:
         handles += plot.plot(present[metric], present[against], **PRESENT)
     _style.dress(plot, _label(data, metric), _label(data, against))
