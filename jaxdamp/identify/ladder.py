@@ -45,7 +45,7 @@ WEIGHTS = ("hidden_weights", "hidden_biases", "output_weights", "output_biases")
 KEYS = 3
 STEPS, PATIENCE, LEARNING_RATE = 300, 100, 0.05  # of the training
 SAMPLES_PER_CYCLE = 100
-FEWEST = 2  # records: one to stop by, the others to train on
+TRAINED_ON = 0.7  # of a single record, whose rest decides when the training stops
 
 
 def _friction(velocity: np.ndarray, force: np.ndarray) -> AbstractDamper:
@@ -269,9 +269,10 @@ class LearntStart(AbstractTrainedStart):
     """`Linear + NeuralHysteresis + Spring`, trained on the records that a fit gives it, as a start for this fit.
 
     The record of middle peak velocity decides, as a whole, when to stop the training and which key of the random
-    weights is best; the law is trained on all others. A fit that starts from here changes only the coefficient, the
-    stiffnesses and the spring; the weights stay, since a fit to all records would undo the early stopping. The same
-    records and keys give the same law. `cross_validate` trains without the record that it holds out.
+    weights is best; the law is trained on all others. Of a single record the last 30 % of its time decide. A fit that
+    starts from here changes only the coefficient, the stiffnesses and the spring; the weights stay, since a fit to all
+    records would undo the early stopping. The same records and keys give the same law. `cross_validate` trains without
+    the record that it holds out.
 
     Arguments:
         keys: number of random starts, keys 0, 1, ....
@@ -294,15 +295,14 @@ class LearntStart(AbstractTrainedStart):
         return min(self.trainings(runs), key=lambda training: training.held_out_rmse).law
 
     def trainings(self, runs: Sequence[BenchRun]) -> list[Training]:
-        """The training from each key.
-
-        Raises:
-            ValueError: fewer than two records.
-        """
-        if len(runs) < FEWEST:
-            must = "hold two records or more, as one of them decides when the training stops"
-            _checks.refuse("runs", must, f"{len(runs)}", "Take a law with few parameters.")
-        stop = sorted(range(len(runs)), key=lambda i: runs[i].peak_velocity)[len(runs) // 2]
+        """The training from each key."""
+        if len(runs) == 1:
+            time = runs[0].time
+            middle = float(time[round(TRAINED_ON * len(time))])
+            runs = [runs[0].between(float(time[0]), middle), runs[0].between(middle, np.inf)]
+            stop = 1
+        else:
+            stop = sorted(range(len(runs)), key=lambda i: runs[i].peak_velocity)[len(runs) // 2]
         rest = [run for i, run in enumerate(runs) if i != stop]
         how: dict[str, Any] = {"steps": STEPS, "patience": PATIENCE, "learning_rate": LEARNING_RATE}
         how |= {"weighting": "runs", "samples_per_cycle": SAMPLES_PER_CYCLE} | self.options

@@ -7,7 +7,7 @@ import pytest
 
 from jaxdamp import identify
 from jaxdamp.bench import SineTest, VirtualDyno
-from jaxdamp.dampers import Bilinear, Lag, Linear, PiecewiseLinear, Polynomial
+from jaxdamp.dampers import Bilinear, Lag, Linear, PiecewiseLinear, Polynomial, SeriesSpring
 from jaxdamp.identify import compare, cross_validate
 from jaxdamp.identify.held_out import motions
 from jaxdamp.identify.model import is_memoryless
@@ -44,7 +44,25 @@ def test_refits_from_the_common_optimum_are_those_from_the_start(law):
         error = fold.result.respond(run)[compared] - run.force[compared]
         expected[fold.held_out] = float(np.sqrt(np.mean(error**2)))
     (rung,) = compare({"law": law}, runs).rungs
-    assert {score.name: score.rmse for score in rung.scores} == pytest.approx(expected, rel=5e-3)
+    *scores, beyond = rung.scores
+    assert {score.name: score.rmse for score in scores} == pytest.approx(expected, rel=5e-3)
+    model, fastest = rung.result.model, runs[-1]  # whose force beyond the others is that of the fit of all records
+    at = np.flatnonzero(np.abs(fastest.velocity) > runs[1].peak_velocity)
+    at = at[at >= used_samples(model, fastest, is_memoryless(model)).start]
+    error = (rung.result.respond(fastest) - fastest.force)[at]
+    assert beyond.name == f"{fastest.name}, beyond the others"
+    assert beyond.rmse == pytest.approx(np.sqrt(np.mean(error**2)), rel=5e-3)
+    assert rung.judged_on.endswith("velocities that no other reaches by the fit of all")
+
+
+def test_velocities_that_one_record_alone_reaches_count_too():
+    truth = SeriesSpring(PiecewiseLinear([-0.3, -0.08, 0.08, 0.3], [4300.0, 530.0, 770.0, 870.0, 2700.0]), 4.1e5)
+    tests = [SineTest(0.004, 1.8, cycles=4), SineTest(0.006, 0.9, cycles=4), SineTest(0.024, 4.0, cycles=8)]
+    runs = list(VirtualDyno(truth, sampling_rate=400.0, force_noise=20.0).run(tests))
+    comparison = compare(identify.default_ladder(runs, ["polynomial", "series_spring_dahl"]), runs)
+    assert comparison.best.name.startswith("series_spring_dahl")
+    assert comparison.best.held_out_fit_percent > 94.0  # in the slow motion, which is noise, 31 % and not told apart
+    assert next(rung for rung in comparison.rungs if rung.name == "polynomial").held_out_fit_percent < 80.0
 
 
 def test_a_single_record_is_judged_quarter_by_quarter(sines):

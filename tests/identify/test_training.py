@@ -8,8 +8,8 @@ import optax
 import pytest
 
 from jaxdamp import identify
-from jaxdamp.bench import SineTest, VirtualDyno
-from jaxdamp.dampers import BoucWen, Hybrid, Lag, Linear, PiecewiseLinear
+from jaxdamp.bench import RandomTest, SineTest, VirtualDyno
+from jaxdamp.dampers import Bilinear, BoucWen, Hybrid, Lag, Linear, PiecewiseLinear
 from jaxdamp.parameters import free_parameters, get
 
 
@@ -116,5 +116,17 @@ def test_the_learnt_rung_is_trained_without_the_record_it_stops_by(lagged, monke
         "law.terms.2.stiffness",
         "rig.force_offset",
     }
-    with pytest.raises(ValueError, match="two records or more"):
-        identify.fit(start, lagged[:1])
+
+
+@pytest.mark.slow
+def test_of_a_single_record_the_last_part_decides_when_the_training_stops():
+    test = RandomTest(0.02, 0.3, duration=8.0, band=(0.25, 4.0))
+    (run,) = VirtualDyno(Lag(Bilinear(2400.0, 1100.0), 0.006), 250.0, force_noise=5.0).run([test])
+    known = run.between(0.0, 5.6)
+    start = identify.LearntStart(keys=1, options={"steps": 200})
+    (training,) = start.trainings([known])
+    (first,), (last,) = training.runs, training.held_out
+    assert len(first) + len(last) == len(known) and last.time[0] > first.time[-1]
+    assert len(first) == pytest.approx(0.7 * len(known), abs=1)
+    result = identify.fit(start, known)
+    assert result.score([run.between(5.6, 8.0)])[0] > 90.0  # a straight line reaches 60 %, two slopes 87
