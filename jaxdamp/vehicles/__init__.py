@@ -16,7 +16,7 @@ from jaxdamp.vehicles.cars import FullCar, HalfCar, QuarterCar, RollCar
 from jaxdamp.vehicles.channels import Channel as Channel, ChannelKind as ChannelKind
 from jaxdamp.vehicles.chosen_metrics import GOALS as GOALS, is_stationary as is_stationary
 from jaxdamp.vehicles.corner import Axle, Corner
-from jaxdamp.vehicles.critical_damping import CriticalDamping as CriticalDamping, critical_damping
+from jaxdamp.vehicles.critical import CriticalDamping as CriticalDamping, critical_damping
 from jaxdamp.vehicles.equilibrium import (
     refuse_restless as refuse_restless,
     rest_position as rest_position,
