@@ -122,8 +122,8 @@ def _picture(loops: Loops) -> Figure:
     over_velocity, over_stroke = figure.subplots(1, 2, sharey=True)
     lines = _draw(over_velocity, loops.velocity, loops.force)
     _draw(over_stroke, 1e3 * loops.stroke, loops.force)
-    style.dress(over_velocity, "velocity [m/s]   (+ rebound)", style.FORCE)
-    style.dress(over_stroke, "stroke [mm]   (+ rebound)", "")
+    style.dress(over_velocity, style.VELOCITY, style.FORCE)
+    style.dress(over_stroke, style.STROKE, "")
     style.legend_beside(figure, lines, f"±{1e3 * AMPLITUDE:g} mm at")
     return figure
 

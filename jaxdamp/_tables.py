@@ -62,7 +62,19 @@ class Column(NamedTuple):
         """A cell for reading; nothing where there is no value."""
         if cell is None:
             return ""
-        return display().words(cell) if isinstance(cell, str) else format(cell, self.spec)
+        return display().words(cell) if isinstance(cell, str) else _written(cell, self.spec)
+
+
+def _written(number: float, spec: str) -> str:
+    """A number in a format, but without a power of ten from 0.001 to 99 999, and without a sign of zero.
+
+    >>> [_written(number, ".4g") for number in (11187.4, -1032.4, 0.00123, 8.818e-05, -0.0)] + [_written(-0.04, ".1f")]
+    ['11187', '-1032', '0.00123', '8.818e-05', '0', '0.0']
+    """
+    text = format(number, spec)
+    if "e" in text and not isinstance(number, Shown | int) and 1e-3 <= abs(number) < 1e5:
+        text = f"{number:.0f}" if abs(number) >= 1e3 else np.format_float_positional(float(text), trim="-")
+    return text[1:] if re.fullmatch(r"[-+]0(\.0*)?", text) else text
 
 
 @dataclass(frozen=True, repr=False)

@@ -145,9 +145,9 @@ def _page(
     report.verdict(
         f"{preflight.summary}.",
         *fit_verdict(report, fits.comparison),
-        "" if truth is None else truth_verdict(scenario, truth),
-        *(f"{name}: {ride_verdict(responses)}" for name, responses in rides.items()),
         *([] if tuned is None else [tuned.verdict.sentence, outcome(tuned)]),
+        *(f"{name}: {ride_verdict(responses)}" for name, responses in rides.items()),
+        "" if truth is None else truth_verdict(scenario, truth),
     )
     _introduce(report, scenario)
     add_records(report, tuple(runs), tuple(held), preflight=preflight)

@@ -22,6 +22,7 @@ from jaxdamp.cli.riding import Driving, beyond_vehicles, headline, unusual
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, read_module, with_law, write_laws
 from jaxdamp.control import Controlled
 from jaxdamp.dampers import AbstractDamper
+from jaxdamp.parameters import match_paths, parameters
 from jaxdamp.report import MOST_POINTS, Table, best_points, sweep_report, tuning_report
 from jaxdamp.roads import WhiteRoad
 from jaxdamp.simulation import stationary_notes
@@ -223,7 +224,8 @@ def sweep_command(
             shown = {"progress": lambda done, total: advance(f"{done} of {total} points", done)}
             data = sweep(ride, over, **how.arguments(file=kept_file("sweep.nc"), **shown))
         remarks = beyond_vehicles(car, over) + [str(warning.message) for warning in caught]
-        at_start = {name: float(value) for name, value in ride().items()} if limits else {}
+        at = _present(car, over)
+        at_start = {name: float(value) for name, value in ride(at if len(at) == len(over) else None).items()}
         spans = limit_spans(limits, names, at_start)
         before = None if beside is None else dict(ride.of_vehicle(beside)())
         table = data.jaxdamp.table()
@@ -234,7 +236,9 @@ def sweep_command(
         with work.saving("Tables") as draft:
             write_tables(draft, {"sweep": table})
             data.to_netcdf(draft / "sweep.nc", engine="scipy")
-        work.page(sweep_report, data, remarks=remarks, limits=spans, baseline=before)
+        plane = _comfort_and_grip(car, names, white=white)
+        marks = {"limits": spans, "baseline": before, "present": {**at, **at_start}, "plane": plane}
+        work.page(sweep_report, data, remarks=remarks, **marks)
 
 
 def _show_points(screen: Screen, table: Table, best: Callable[[], list[str]]) -> None:
@@ -242,6 +246,19 @@ def _show_points(screen: Screen, table: Table, best: Callable[[], list[str]]) ->
     screen.table(table.first(MOST_POINTS if screen.verbose else ON_SCREEN))
     if len(table.rows) > ON_SCREEN:
         screen.points([f"sweep.csv has all {len(table.rows)} points.", *best()])
+
+
+def _comfort_and_grip(car: AbstractVehicle, names: Sequence[str], *, white: bool) -> tuple[str, str] | None:
+    """The first metrics of comfort and grip, where both are swept."""
+    comfort, grip = (_metrics_of("metric", word, car, white=white)[0] for word in ("comfort", "grip"))
+    return (comfort, grip) if {comfort, grip} <= set(names) else None
+
+
+def _present(car: AbstractVehicle, over: Mapping[str, np.ndarray]) -> dict[str, float]:
+    """The values that the vehicle has of the axes; those left out that stand for several different ones."""
+    known = {p.path: float(p.value) for p in parameters(car) if not np.shape(p.value)}
+    values = {name: {known[path] for path in match_paths(list(known), [name])} for name in over}
+    return {name: value.pop() for name, value in values.items() if len(value) == 1}
 
 
 def _limits_by_metric(limit: Mapping[str, Any], car: AbstractVehicle, *, white: bool) -> dict[str, Any]:

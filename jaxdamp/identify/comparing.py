@@ -60,15 +60,16 @@ class Comparison(AbstractComparison[Rung, BenchRun]):
         return {name: with_unit(*error) for name, error in errors.items()}
 
     def plot(self, kind: str = "ladder", **options: Any) -> Figure:
-        """The errors of the laws side by side (`plots.ladder`), or the sheet of the recommended law.
+        """The errors of the laws side by side (`plots.ladder`), their loops, or the sheet of the recommended law.
 
         Arguments:
-            kind: "ladder", or "sheet" for one A4 page (`plots.damper_sheet`).
+            kind: "ladder", "loops" for the same record in a panel for each law (`plots.loops_by_law`), or "sheet" for
+                one A4 page (`plots.damper_sheet`).
             options: of that function.
         """
-        from jaxdamp.plots import damper_sheet, ladder
+        from jaxdamp.plots import damper_sheet, ladder, loops_by_law
 
-        return plotted(kind, {"ladder": ladder, "sheet": damper_sheet}, self, **options)
+        return plotted(kind, {"ladder": ladder, "loops": loops_by_law, "sheet": damper_sheet}, self, **options)
 
     def __repr__(self) -> str:
         judged = any(rung.judged_on for rung in self.rungs)

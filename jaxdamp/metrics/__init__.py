@@ -7,7 +7,7 @@ signal gives NaN. Only `rainflow_cycles` and functions that return texts (`evalu
 cannot be compiled.
 
 - Size of a signal: `rms`, `peak`, `smooth_peak`, `crest_factor`, `running_rms`.
-- Spectrum: `power_spectral_density`, `transmissibility`, `coherence`.
+- Spectrum: `power_spectral_density`, `transmissibility`, `coherence`, `third_octave_rms`.
 - Human vibration, ISO 2631-1: `weighting_factor`, `weighting_response`, `weighting_state_space`, `weighted_signal`,
   `weighted_rms`, `max_transient_value`, `vibration_dose_value`, `estimated_vibration_dose_value`,
   `motion_sickness_dose`, `motion_sickness_percentage`, `shock_ratios`, `evaluation_method`, `vibration_total_value`,
@@ -92,6 +92,7 @@ from jaxdamp.metrics.roughness_index import (
 from jaxdamp.metrics.running import max_transient_value, running_rms
 from jaxdamp.metrics.spectrum import coherence, power_spectral_density, transmissibility
 from jaxdamp.metrics.statistics import STATISTICS, Gathered as Gathered, Reduction, Statistic, Term, percentile
+from jaxdamp.metrics.third_octaves import third_octave_rms
 from jaxdamp.metrics.tyre_load import (
     aggregate_force,
     aggregate_force_percentile,
@@ -151,6 +152,7 @@ __all__ = [
     "spectral_damage",
     "spectral_moments",
     "temperature_rise",
+    "third_octave_rms",
     "total_vibration",
     "transmissibility",
     "velocity_histogram",

@@ -12,6 +12,7 @@ from jaxdamp.plots.changes import tuning
 from jaxdamp.plots.control_charts import control_charts as control_charts
 from jaxdamp.plots.curves import force_velocity, force_velocity_family as force_velocity_family
 from jaxdamp.plots.damper_sheet import damper_sheet as damper_sheet
+from jaxdamp.plots.damping import damping_ratio
 from jaxdamp.plots.errors import cross_validation as cross_validation, ladder
 from jaxdamp.plots.evaluation import (
     evaluation,
@@ -25,7 +26,7 @@ from jaxdamp.plots.frequency import (
     modes,
 )
 from jaxdamp.plots.fronts import pareto
-from jaxdamp.plots.loops import fit_loops as fit_loops, vehicle_fit as vehicle_fit
+from jaxdamp.plots.loops import fit_loops as fit_loops, loops_by_law as loops_by_law, vehicle_fit as vehicle_fit
 from jaxdamp.plots.many_values import (
     damper_comparison as damper_comparison,
     many_fits as many_fits,
@@ -50,6 +51,7 @@ __all__ = [
     "ROLES",
     "STYLE",
     "damper_use",
+    "damping_ratio",
     "evaluation",
     "force_velocity",
     "ladder",

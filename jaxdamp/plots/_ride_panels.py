@@ -10,13 +10,12 @@ from jaxdamp._display import display
 from jaxdamp._tables import typeset_unit
 from jaxdamp._types import Axes
 from jaxdamp.plots import _rides, _sheet, _style, fitted_range
-from jaxdamp.plots.rides import default_channels
+from jaxdamp.plots.damping import ratios, wheel_axis
 from jaxdamp.rig import quasi_static
 from jaxdamp.roads import assess_roughness, class_limits, road_class
 
 
 _MM, _BINS, _MOST_BARS = 1e3, 31, 6
-SETTLED = 0.05  # share of the peak below which the motion over a bump has settled
 
 
 def vehicle(axes: Axes, shown: _rides.Rides) -> None:
@@ -101,11 +100,9 @@ def plane(axes: Axes, shown: _rides.Rides) -> None:
     if not shown.single:
         arrow = {"arrowstyle": "-|>", "color": _style.AFTER["color"], "linewidth": 1.4, "shrinkA": 5, "shrinkB": 6}
         axes.annotate("", places[1], places[0], arrowprops=arrow)
-        axes.plot(
-            *places[0], "o", color=_style.BLACK, markersize=8, label=_style.in_words(shown.names[0]), linestyle=""
-        )
+        axes.plot(*places[0], **_style.PRESENT, label=_style.in_words(shown.names[0]), linestyle="")
     label = _style.in_words(shown.names[1])
-    axes.plot(*places[1], "*", color=_style.AFTER["color"], markersize=14, label=label, linestyle="")
+    axes.plot(*places[1], **_style.BEST, label=label, linestyle="")
     _limits(axes, shown, comfort, grip)
     units = [typeset_unit(shown.units[names[0]]) for names in (comfort, grip)]
     x = f"less comfort →   {_style.metric_words(comfort[0])} [{units[0]}]"
@@ -173,34 +170,55 @@ def _bar(axes: Axes, shown: _rides.Rides, row: int, name: str) -> None:
     axes.text(0.01, row - 0.3, text, transform=axes.get_yaxis_transform(), fontsize=6.5, va="center", zorder=5)
 
 
-def damper(curves: Axes, shares: Axes, shown: _rides.Rides, path: str) -> None:
-    """A damper before and after over mm/s, and the share of time at each velocity with its four quadrants."""
-    laws = [shown.laws(path, number) for number in (0, 1)]
+def damper(panels: Sequence[Axes], shown: _rides.Rides, path: str) -> None:
+    """A damper before and after over mm/s: its force, its damping ratio, and the share of time at each velocity.
+
+    Arguments:
+        panels: one above the other, all over velocity; without a damping ratio two.
+        shown: the rides.
+        path: of its law.
+    """
+    curves, *damping, shares = panels
     velocities = [_rides.damper_velocity(shown, path, number) for number in (0, 1)]
     known = [np.abs(v).max() for v in velocities if v is not None]
     reach = 1.05 * float(max(known)) if known else 1.0
-    points = np.linspace(-reach, reach, 401)
-    for label, style, number in shown.styles():
-        for law in laws[number]:
-            force = np.asarray(quasi_static(law, points).force)
-            fitted_range.curve(curves, law, points, force, label=label or "law", **style)
-            label = "_"  # the others of a damper at several commands
+    several = _draw_law(curves, damping, shown, path, np.linspace(-reach, reach, 401))
+    for _, style, number in shown.styles():
         velocity = velocities[number]
         if velocity is not None:
             edges = np.linspace(-reach, reach, _BINS + 1)
             share = 100.0 * np.asarray(metrics.velocity_histogram(velocity, edges))
             shares.step(0.5 * (edges[1:] + edges[:-1]), share, where="mid", **style)
-    fitted_range.shade(curves, [law for of_one in laws for law in of_one], points)
-    _thousandths(curves, shares)
+    _thousandths(*panels)
     title = _style.first_upper(_style.in_words(path).removesuffix(" law"))
-    _style.dress(curves, "", "force [N]", title + ", at all levels of its command" * (len(laws[1]) > 1))
+    _style.dress(curves, "", "force [N]", title + ", at all levels of its command" * several)
     _style.cross(curves)
     _style.dress(shares, "velocity [mm/s]   (+ rebound)", "time [%]", _rides.quadrants(velocities[1]))
-    curves.tick_params(labelbottom=False)
     curves.set_xlim(-reach, reach)
     if len(shown.styles()) > 1:
         drawn = [line for line in curves.get_lines() if not str(line.get_label()).startswith("_")]
         curves.legend(handles=drawn, frameon=False, loc="upper left")
+    for above in (curves, *damping):
+        above.tick_params(labelbottom=False)
+
+
+def _draw_law(curves: Axes, damping: Sequence[Axes], shown: _rides.Rides, path: str, points: np.ndarray) -> bool:
+    """Force and damping ratio of a law before and after; whether it is drawn at several commands."""
+    laws = [shown.laws(path, number) for number in (0, 1)]
+    critical = [_rides.critical(shown, path, number) for number in (0, 1)]
+    heights = []
+    for label, style, number in shown.styles():
+        for law in laws[number]:
+            force, one = np.asarray(quasi_static(law, points).force), critical[number]
+            fitted_range.curve(curves, law, points, force, label=label or "law", **style)
+            label = "_"  # the others of a damper at several commands
+            heights += [ratios(axes, law, one, points, force, **style) for axes in damping if one is not None]
+    fitted_range.shade(curves, [law for of_one in laws for law in of_one], points)
+    for axes in damping:
+        _style.dress(axes, "", "body [–]", "Damping ratio")
+        axes.set_ylim(0.0, max(heights))
+        wheel_axis(axes, [one for one in critical if one is not None])
+    return len(laws[1]) > 1
 
 
 def _thousandths(*panels: Axes) -> None:
@@ -209,57 +227,3 @@ def _thousandths(*panels: Axes) -> None:
 
     for axes in panels:
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: _style.short(_MM * value)))
-
-
-def spectrum(axes: Axes, shown: _rides.Rides) -> None:
-    """The spectrum of the body acceleration before and after, smoothed, with the bands of body and wheels."""
-    channel = default_channels(shown.cars[0].layout)[0]
-    pair = _rides.body_spectra(shown, channel)
-    if pair is None:
-        _sheet.remarks(axes, "Spectrum", ["Several roads or conditions; see the page."], width=60)
-        return
-    for label, style, number in shown.styles():
-        axes.loglog(*_rides.smoothed(*pair[number]), label=label, **style)
-    low, high = axes.get_ylim()
-    for frequency in shown.frequencies:
-        axes.axvspan(frequency / 1.15, frequency * 1.15, color=_style.SHADE, linewidth=0.0, zorder=0.1)
-    frequencies = shown.frequencies
-    for word, group in (("body", frequencies[frequencies < 4.0]), ("wheels", frequencies[frequencies >= 4.0])):
-        if group.size:
-            middle = float(np.exp(np.mean(np.log(group))))
-            axes.text(middle, 0.02, word, transform=axes.get_xaxis_transform(), ha="center", color=_style.GREY)
-    axes.set_ylim(max(0.3 * low, 1e-5 * high), high)  # with room for these words below the dips
-    _style.plain_log_axis(axes.xaxis)
-    axes.set_xlim(0.5, 30.0)
-    unit = typeset_unit(shown.cars[0].units[channel])
-    title = f"Spectrum of the {_style.metric_words(channel)}{_rides.dips(shown)}"
-    _style.dress(axes, "frequency [Hz]", f"PSD [({unit})²/Hz]", title)
-    if len(shown.styles()) > 1:
-        axes.legend(frameon=False, loc="lower left")
-
-
-def event(axes: Axes, shown: _rides.Rides) -> None:
-    """The motion of the body over a bump, with its peaks, overshoot and settling time."""
-    assert shown.responses is not None
-    channel = next((n for n in ("sprung_displacement", "chassis_displacement") if n in shown.responses[0].units), "")
-    channel = channel or default_channels(shown.cars[0].layout)[0]
-    factor = _MM if shown.responses[0].units[channel] == "m" else 1.0
-    unit = "mm" if factor == _MM else typeset_unit(shown.responses[0].units[channel])
-    for label, style, number in shown.styles():
-        response = shown.responses[number]
-        time, values = np.asarray(response.time), factor * np.asarray(response[channel])
-        moved = np.abs(np.asarray(response.road_rate)).max(axis=1)
-        end = float(time[np.flatnonzero(moved > 1e-3 * moved.max())[-1]])
-        after = values[time > end]
-        over = f", {_style.short(float(np.abs(after).max()))} {unit} after it" if after.size else ""
-        last = float(time[np.flatnonzero(np.abs(values) > SETTLED * np.abs(values).max())[-1]])
-        settled = (
-            "not settled" if last > 0.99 * time[-1] else f"settled {_style.short(max(last - end, 0.0))} s after it"
-        )
-        words = f"up {_style.short(values.max())} {unit}, down {_style.short(values.min())} {unit}{over}, {settled}"
-        axes.plot(time, values, label=f"{label}: {words}" if label else words, **style)
-    _style.dress(
-        axes, "time [s]", f"[{unit}]   (+ up)", f"{_style.first_upper(_style.metric_words(channel))} over the bump"
-    )
-    _style.cross(axes, vertical=False)
-    axes.legend(frameon=False, loc="best")

@@ -4,6 +4,7 @@ import dataclasses
 import functools
 import warnings
 from collections.abc import Mapping, Sequence
+from statistics import NormalDist
 from typing import Any
 
 import equinox as eqx
@@ -11,7 +12,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxdamp import metrics
 from jaxdamp.control import laws_at_levels
 from jaxdamp.dampers import AbstractDamper, Linear, takes_command, without_fitted_ranges
 from jaxdamp.parameters import get
@@ -20,13 +20,13 @@ from jaxdamp.rig import quasi_static
 from jaxdamp.roads import WhiteRoad, from_profile
 from jaxdamp.simulation import Response, Ride, simulate
 from jaxdamp.tune import Rescore, TuneResult, damper_paths, limit_spans
-from jaxdamp.vehicles import AbstractVehicle, modes
+from jaxdamp.vehicles import AbstractVehicle, CriticalDamping, critical_damping, equivalent_dampers, modes
 
 
 GOALS = {"comfort": "body acceleration", "travel": "suspension travel", "grip": "tyre load variation"}
 FACTORS = np.geomspace(0.3, 3.0, 13)  # of the damping, along the curve of constant damping
-BANDS = 9  # points of a spectrum in an octave
 _MOST_DAMPERS = 2
+_NORMAL = np.array([NormalDist().inv_cdf((i + 0.5) / 2000) for i in range(2000)])
 _EVENT = 0.35  # share of the run within which the road is moved: less is a bump
 
 
@@ -159,13 +159,32 @@ def _slope(law: Any) -> float:
     return max(float(force[1] - force[0]) / 0.4, 50.0)
 
 
+def element(shown: Rides, path: str, number: int) -> str | None:
+    """The name of a damper by the path of its law, of several with this law the first on its axle; None without one."""
+    car, frame = shown.passive[number], shown.passive[number].frame()
+    law, own = get(car, path), [name for name in frame.element_names if not name.endswith("lift_off")]
+    with_it = [name for name in own if frame.element(name).law is law]
+    return next((n for n in with_it if n.startswith(path.partition(".")[0])), next(iter(with_it), None))
+
+
 def damper_velocity(shown: Rides, path: str, number: int) -> np.ndarray | None:
-    """The velocity of a damper over time [m/s]; None on a white road, or where the damper has no channel."""
-    if shown.responses is None:
-        return None
-    response = shown.responses[number]
-    names = [d for d in response.dampers if path.replace(".", "_").startswith(d)] or list(response.dampers)[:1]
-    return np.asarray(response[f"{names[0]}_velocity"]) if names else None
+    """The velocity of a damper over time [m/s]; None where it is not known.
+
+    On a white road it is normally distributed: values of equal probability.
+    """
+    name = element(shown, path, number)
+    if isinstance(shown.road, WhiteRoad):
+        motion = equivalent_dampers(shown.cars[number], shown.road.velocity_psd, speed=shown.road.speed)
+        size = float(motion[name].velocity_rms) if name in motion else np.inf
+        return size * _NORMAL if np.isfinite(size) else None
+    response = None if shown.responses is None else shown.responses[number]
+    return None if response is None or name not in response.dampers else np.asarray(response[f"{name}_velocity"])
+
+
+def critical(shown: Rides, path: str, number: int) -> CriticalDamping | None:
+    """Critical damping of body and wheel at a damper; None if it is not alone between the two."""
+    name = element(shown, path, number)
+    return None if name is None else critical_damping(shown.passive[number]).get(name)
 
 
 def quadrants(velocity: np.ndarray | None) -> str:
@@ -186,29 +205,4 @@ def dips(shown: Rides) -> str:
     delays = None if shown.responses is None else shown.responses[0].axle_timing.delays
     if delays is None or len(delays) != 2 or not float(delays[1]):
         return ""
-    dips = (0.5 + np.arange(3)) / float(delays[1])
-    return f" (dips at {', '.join(map(_style.short, dips))} Hz: the axles one after the other)"
-
-
-def body_spectra(shown: Rides, channel: str) -> list[tuple[np.ndarray, np.ndarray]] | None:
-    """Frequencies and densities before and after."""
-    if shown.responses is None:
-        pair = {} if shown.tuning is None else shown.tuning.spectra([channel])
-        return [(one.frequency, one.density) for one in pair[channel]] if pair else None
-    both = []
-    for response in shown.responses:
-        values, dt = np.asarray(response[channel]), float(response.time[1] - response.time[0])
-        size = min(round(4.0 / dt), len(values))
-        frequency, density = (np.asarray(a) for a in metrics.power_spectral_density(values - values.mean(), dt, size))
-        both.append((frequency[1:], density[1:]))
-    return both
-
-
-def smoothed(frequency: np.ndarray, density: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Means of the density in bands of equal width in octaves."""
-    band = np.round(BANDS * np.log2(np.maximum(frequency, 1e-9))).astype(int)
-    inside = (frequency >= 0.4) & (frequency <= 35.0)
-    bands = np.unique(band[inside])
-    return np.array([np.exp(np.mean(np.log(frequency[band == b]))) for b in bands]), np.array(
-        [density[band == b].mean() for b in bands]
-    )
+    return f"dips at {', '.join(_style.short((0.5 + i) / float(delays[1])) for i in range(3))} Hz: axle after axle"

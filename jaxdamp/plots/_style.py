@@ -1,5 +1,6 @@
 """House style of all pictures: what each colour means, names and digits for people, axes, legends, titles."""
 
+import functools
 import re
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -27,6 +28,7 @@ from jaxdamp.dampers import law_name as law_name
 if TYPE_CHECKING:
     import matplotlib.axis
     import matplotlib.lines
+    import matplotlib.text
 
 
 Look = dict[str, Any]  # keywords of a line, patch or text
@@ -42,6 +44,9 @@ MEASURED: Look = {"color": GREY, "linestyle": "-"}
 BEFORE: Look = {"color": BLACK, "linestyle": "--", "linewidth": 1.3, "zorder": 2.5}
 AFTER: Look = {"color": COLOURS[0], "linestyle": "-", "linewidth": 2.0}
 REFERENCE: Look = {"color": "#949494", "linestyle": "-", "linewidth": 3.5, "zorder": 1.5}
+# Points: the design that there is, and the best one.
+PRESENT: Look = {"marker": "o", "color": BLACK, "markersize": 8.0, "markeredgecolor": "white"}
+BEST: Look = {"marker": "*", "color": COLOURS[0], "markersize": 14.0}
 LIMIT: Look = {"color": BAD, "linestyle": "--", "linewidth": 1.2}
 REBOUND, COMPRESSION = COLOURS[0], COLOURS[1]  # where both are on one axis
 FRONT, REAR = "-", "-."
@@ -74,8 +79,8 @@ STYLE: Mapping[str, Any] = MappingProxyType(
 """The look of the library's pictures for figures of your own: `matplotlib.pyplot.style.use(plots.STYLE)`; "C0" to "C5"
 are then its colours."""
 
-VELOCITY = "velocity [m/s]   (+ rebound, − compression)"
-STROKE = "stroke [mm]   (+ rebound, − compression)"
+VELOCITY = "velocity [m/s]   (+ rebound)"
+STROKE = "stroke [mm]   (+ rebound)"
 FORCE = "force [N]   (+ resists extension)"
 SIMULATE = "Take what `jaxdamp.simulate(vehicle, road)` gives, or several by name: {'before': ..., 'after': ...}."
 
@@ -193,15 +198,53 @@ def dress(axes: Axes, x: str, y: str, title: str = "") -> None:
     The numbers drawn are those of the library: where the labels name a unit that is shown otherwise, the ticks are
     round numbers of the other unit, and an axis of the other sign runs the other way.
     """
-    axes.set_xlabel(display().text(x))
-    axes.set_ylabel(display().text(y))
+    _wrap(axes.set_xlabel(display().text(x)), axes)
+    _wrap(axes.set_ylabel(display().text(y)), axes)
     for axis, label in ((axes.xaxis, x), (axes.yaxis, y)):
         _rescale(axis, label)
     if title:
-        axes.set_title(display().words(title), loc="left", fontsize="medium")
+        _wrap(axes.set_title(display().words(title), loc="left", fontsize="medium"), axes)
     axes.grid(True, color="0.9", linewidth=0.8)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
+
+
+_SLACK = 0.35  # inch, by which a title or label may be longer than its axes
+
+
+def _wrap(text: "matplotlib.text.Text", axes: Axes) -> None:
+    """Break a title or label where it is longer than its axes, as wide as these are when they are drawn."""
+    text.set_wrap(True)
+    vars(text)["_get_wrap_line_width"] = functools.partial(_longest, text, axes)  # by default the width of the figure
+
+
+def _longest(text: "matplotlib.text.Text", axes: Axes) -> float:
+    """Pixels of the longest line of a title or label."""
+    figure = text.get_figure(root=True)
+    assert figure is not None
+    box, page, slack = axes.get_window_extent(), figure.bbox, _SLACK * figure.dpi
+    if text.get_rotation():
+        return box.height + slack
+    middle = 0.5 * (box.x0 + box.x1)
+    room = page.x1 - box.x0 if text.get_horizontalalignment() == "left" else 2.0 * min(middle, page.x1 - middle)
+    return min(box.width + slack, room)
+
+
+def few_ticks(axes: Axes, most: int) -> None:
+    """At most so many ticks along the abscissa, and no more than its labels have room for.
+
+    Arguments:
+        axes: of any width.
+        most: ticks.
+    """
+    from matplotlib.ticker import MaxNLocator
+
+    class Ticks(MaxNLocator):
+        def tick_values(self, vmin: float, vmax: float) -> "Sequence[float]":
+            self.set_params(nbins=max(min(most, int(0.6 * axes.xaxis.get_tick_space())), 1))
+            return super().tick_values(vmin, vmax)
+
+    axes.xaxis.set_major_locator(Ticks(steps=[1, 2, 2.5, 5, 10]))
 
 
 def _rescale(axis: "matplotlib.axis.Axis", label: str) -> None:
@@ -246,12 +289,16 @@ def legend_beside(
     figure.legend(handles=list(handles), loc=where, frameon=False, title=title or None, alignment="left")
 
 
-def legend_above(figure: Figure, handles: Sequence[object], columns: int = 3) -> None:
+_LETTERS = 9  # in an inch of a legend, with room for narrower figures
+
+
+def legend_above(figure: Figure, handles: Sequence[Any], columns: int = 3) -> None:
     """A legend above all axes, for pictures that need their width."""
     _in_words(handles)
-    figure.legend(
-        handles=list(handles), loc="outside upper center", frameon=False, ncols=min(columns, max(len(handles), 1))
-    )
+    letters = max((len(line) for handle in handles for line in str(handle.get_label()).split("\n")), default=1)
+    room = int(_LETTERS * figure.get_figwidth() / (letters + 8))  # of so many columns
+    columns = max(min(columns, room, len(handles)), 1)
+    figure.legend(handles=list(handles), loc="outside upper center", frameon=False, ncols=columns)
 
 
 def _in_words(handles: Sequence[Any]) -> None:

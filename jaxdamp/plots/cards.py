@@ -95,9 +95,9 @@ def law_card(
         )
     left_out = int(np.count_nonzero(sizes)) - len(drawn)
     more = f", {left_out} more" if left_out else ""
-    _style.dress(over_velocity, "velocity [m/s]   (+ rebound)", "force [N]   (+ resists extension)")
-    _style.dress(over_stroke, "stroke [mm]   (+ rebound)", "force [N]")
-    _style.dress(effects, f"velocity [m/s] at {frequencies[fastest]:g} Hz", "effect p ∂F/∂p [N]")
+    _style.dress(over_velocity, _style.VELOCITY, _style.FORCE)
+    _style.dress(over_stroke, _style.STROKE, "force [N]")
+    _style.dress(effects, f"velocity [m/s]   (+ rebound), {frequencies[fastest]:g} Hz", "effect p ∂F/∂p [N]")
     reach = float(np.max(np.abs(loops.velocity)))
     points = np.linspace(-reach, reach, 2001)
     shaded = fitted_range.shade(over_velocity, [law], points)

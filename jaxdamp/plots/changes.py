@@ -1,6 +1,5 @@
 """A tuning: laws and spectra before and after, and the change of every ride metric."""
 
-import textwrap
 from typing import Any
 
 import equinox as eqx
@@ -47,8 +46,8 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> Figure:
         gaps += _law(figure.add_subplot(beside[place]), name, pair, points)
     verdict = result.verdict
     colour = _style.GOOD if verdict.better else _style.BAD
-    lines = [verdict.outcome.value, *textwrap.wrap(_style.said(verdict.sentence), 130)]
-    figure.suptitle("\n".join(lines), fontsize="medium", color=colour)
+    words = f"{verdict.outcome.value}\n{_style.said(verdict.sentence)}"
+    figure.suptitle(words, x=0.01, ha="left", fontsize="medium", color=colour, wrap=True)
     _bars(bars, result)
     _style.note_below(figure, gaps)
     return figure
@@ -89,26 +88,16 @@ def _bars(axes: Axes, result: TuneResult) -> None:
     change = [percent_change(result.before[n], result.after[n]) or 0.0 for n in names]
     colours = [_style.COLOURS[1] if c > 0 else _style.COLOURS[2] for c in change]
     axes.barh(rows, change, 0.65, color=colours)
-    for row, name, value in zip(rows, names, change, strict=True):
-        unit = typeset_unit(result.units[name])
-        values = f"{_style.short(result.before[name])} → {_style.short(result.after[name])} {unit}".rstrip()
-        text = f"{values}  ({value:+.1f} %)".replace("-", "−")
-        axes.annotate(
-            text,
-            (max(value, 0.0), row),
-            xytext=(4, 0),
-            textcoords="offset points",
-            verticalalignment="center",
-            fontsize="small",
-        )
     reached = {n: " (limit reached)" if n in result.active_limits else " (limited)" for n in result.limits}
     reached |= dict.fromkeys(result.violated, " (LIMIT VIOLATED)")
-    marks = [" (minimised)" if n == result.metric else reached.get(n, "") for n in names]
-    axes.set_yticks(rows, [_style.metric_words(n) + mark for n, mark in zip(names, marks, strict=True)])
+    labels = []
+    for name, value in zip(names, change, strict=True):
+        mark = " (minimised)" if name == result.metric else reached.get(name, "")
+        values = " → ".join(_style.quantity(side[name], result.units[name]) for side in (result.before, result.after))
+        labels.append(f"{_style.metric_words(name)}{mark}\n{values}  ({_style.percent(value, 1)})")
+    axes.set_yticks(rows, labels, fontsize="small")
     axes.invert_yaxis()
-    lower, upper = min(*change, 0.0), max(*change, 0.0)
-    spread = max(upper - lower, 1.0)
-    axes.set_xlim(lower - 0.05 * spread, upper + 0.95 * spread)
+    axes.margins(x=0.08)
     _style.dress(axes, "change [%]", "", "Ride metrics")
     axes.grid(False, axis="y")
     _style.cross(axes, horizontal=False)

@@ -145,7 +145,7 @@ def _facts(damper: _Damper) -> str:
     facts += [f"settings {', '.join(settings)}"] * (len(settings) > 1)
     temperatures = [float(run.temperature.mean()) for run in runs if run.temperature is not None]
     facts += [f"{np.mean(temperatures) - 273.15:.0f} °C"] if temperatures else []
-    return " · ".join([*facts, "+ rebound, − compression"])
+    return " · ".join([*facts, "+ rebound"])
 
 
 def _force_velocity(

@@ -56,7 +56,7 @@ def ladder(comparison: Comparison | VehicleComparison) -> Figure:
     axes.get_yticklabels()[[r.name for r in rungs].index(comparison.best.name)].set_fontweight("bold")
     axes.invert_yaxis()
     axes.margins(x=0.1)
-    _style.legend_beside(figure, handles)
+    _style.legend_above(figure, handles, 2)
     return figure
 
 

@@ -95,7 +95,7 @@ def evaluation(evaluation: Evaluation, baseline: Evaluation | None = None, limit
         name: {"color": colours[runs[0].name] if several else _style.BLACK, "linewidth": 1.4}
         for name, runs in evaluation.settings.items()
     }
-    _draw_forces(panels["peaks"], evaluation, styles)
+    ends = _draw_forces(panels["peaks"], evaluation, styles)
     handles += [Line2D([], [], color=colour, linewidth=2.0, label=label) for label, colour in labels]
     handles.append(Line2D([], [], color=_style.GREY, linewidth=7.0, alpha=0.3, label="± scatter over cycles"))
     marks: _style.Look = {"marker": "o", "markerfacecolor": "white", "color": _style.BLACK, "linestyle": ""}
@@ -103,6 +103,8 @@ def evaluation(evaluation: Evaluation, baseline: Evaluation | None = None, limit
     handles.append(Line2D([], [], label="at stated velocity", **{**marks, "marker": "D", "markerfacecolor": None}))
     handles += _draw_limits(panels["peaks"], limits) if limits is not None else []
     _dress(panels)
+    panels["peaks"].set_xlim(*panels["peaks"].get_xlim())
+    _style.label_ends(panels["peaks"], ends)
     _style.legend_beside(figure, handles)
     return figure
 
@@ -192,19 +194,25 @@ def _closed(values: Float[np.ndarray, " points"]) -> Float[np.ndarray, " more"]:
     return np.append(values, values[0])
 
 
-def _draw_forces(axes: Axes, evaluation: Evaluation, styles: Mapping[str, Mapping[str, Any]]) -> None:
+def _draw_forces(axes: Axes, evaluation: Evaluation, styles: Mapping[str, Mapping[str, Any]]) -> list:
     """Forces at peak velocity of each setting, and those at stated velocities.
 
     Lines join the peaks of a setting whose velocities differ clearly; repeats of one velocity stand beside each other.
+    At rest is the gas force with the friction to both sides, where a slow record tells them. Of several settings each
+    is named at the end of its line, which is returned.
     """
-    for setting, runs in evaluation.settings.items():
-        values = {(m.quantity, m.record): m.value for m in evaluation.measurements}
+    ends: list = []
+    for setting in evaluation.settings:
         for side in ("rebound", "compression"):
-            pairs = sorted((values[f"{side} velocity", run.name], values[f"{side} force", run.name]) for run in runs)
-            velocity, force = np.array(pairs).T
+            velocity, force = _branch(evaluation, setting, side)
             joined = bool(np.all(np.diff(velocity) > _DISTINCT * np.abs(velocity).max()))
             look = styles[setting] if joined else {**styles[setting], "linestyle": ""}
-            axes.plot(velocity, force, marker="o", markersize=4.5, markerfacecolor="white", **look)
+            peaks = np.flatnonzero(velocity).tolist()
+            marks: _style.Look = {"marker": "o", "markersize": 4.5, "markerfacecolor": "white", "markevery": peaks}
+            drawn = axes.plot(velocity, force, **marks, **look)
+            if side == "rebound" and len(evaluation.settings) > 1 and setting:
+                drawn[0].set_label(setting)
+                ends += drawn
         stated = [
             ((1 if m.quantity == "rebound force" else -1) * m.velocity, m.value)
             for m in evaluation.measurements
@@ -212,6 +220,18 @@ def _draw_forces(axes: Axes, evaluation: Evaluation, styles: Mapping[str, Mappin
         ]
         if stated:
             axes.plot(*np.array(stated).T, "D", markersize=4.5, color=styles[setting]["color"], zorder=3)
+    return ends
+
+
+def _branch(evaluation: Evaluation, setting: str, side: str) -> tuple[np.ndarray, np.ndarray]:
+    """Velocities and forces at the peaks of a side, with gas force and friction at rest where they are known."""
+    values = {(m.quantity, m.record): m.value for m in evaluation.measurements}
+    runs = evaluation.settings[setting]
+    pairs = [(values[f"{side} velocity", run.name], values[f"{side} force", run.name]) for run in runs]
+    if slow := evaluation.gas_and_friction.get(setting):
+        pairs.append((0.0, slow.gas_force + (slow.friction if side == "rebound" else -slow.friction)))
+    velocity, force = np.array(sorted(pairs)).T
+    return velocity, force
 
 
 def _draw_limits(axes: Axes, limits: LimitCheck) -> list:
@@ -247,7 +267,7 @@ def _dress(panels: Mapping[str, Axes]) -> None:
         if name not in "vx":
             axes.set_ylabel("")
         _style.cross(axes, vertical=name != "t")
-        axes.locator_params(axis="x", nbins=6)
+        _style.few_ticks(axes, 6)
 
 
 def limit_check(check: LimitCheck) -> Figure:
@@ -273,5 +293,5 @@ def limit_check(check: LimitCheck) -> Figure:
     axes.set_yticks(range(len(labels)), labels)
     axes.set_ylim(len(labels) - 0.5, -0.5)
     axes.set_xlabel("value, as a share of the largest of limits and value")
-    figure.suptitle(check.summary)
+    figure.suptitle(check.summary, wrap=True)
     return figure

@@ -1,12 +1,13 @@
-"""Natural modes, and responses over frequency: of a vehicle to a sine of its road, of a law on the test machine."""
+"""Natural modes; over frequency, vehicles on a sine of their road, laws on the test machine, and what is felt."""
 
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from jaxdamp import metrics
 from jaxdamp._steady_cycles import AbstractSteadyCycles
-from jaxdamp._types import Figure
+from jaxdamp._types import Axes, Figure
 from jaxdamp.plots import _style
 from jaxdamp.rig import DynamicStiffness
 from jaxdamp.simulation import HarmonicResponse
@@ -99,3 +100,46 @@ def _over_frequency(
     _style.legend_beside(figure, lines, legend)
     _style.note_below(figure, result.warnings)
     return figure
+
+
+_FELT = 0.01  # share of the largest band from which bands are drawn
+
+
+def third_octaves(
+    axes: Axes,
+    sides: Sequence[tuple[str, _style.Look, tuple[np.ndarray, np.ndarray]]],
+    weighting: str,
+    unit: str,
+    name: str,
+) -> None:
+    """Weighted RMS in third octaves of spectra: the last one filled, the others as outlines.
+
+    Arguments:
+        axes: to draw in.
+        sides: label, look and spectrum (frequencies, densities) of each.
+        weighting: of ISO 2631-1.
+        unit: of the signal.
+        name: of the signal, in words.
+    """
+    found = [np.stack([np.asarray(a) for a in metrics.third_octave_rms(*each, weighting)]) for *_, each in sides]
+    known = np.all([np.isfinite(rms) for _, rms in found], axis=0)
+    largest = np.max([np.where(known, rms, 0.0) for _, rms in found], axis=0)
+    drawn = np.flatnonzero(known & (largest > _FELT * largest.max()))
+    bands = slice(drawn[0], drawn[-1] + 1) if drawn.size else slice(0)
+    for number, ((label, style, _), (centre, rms)) in enumerate(zip(sides, found, strict=True)):
+        ends = np.append(centre[bands] * 10.0**-0.05, centre[bands][-1:] * 10.0**0.05)
+        look = {name: value for name, value in style.items() if name != "color"} | {"edgecolor": style["color"]}
+        filled = number == len(sides) - 1
+        shade: _style.Look = {"facecolor": (style["color"], 0.3)} if filled else {}
+        axes.stairs(rms[bands], ends, fill=filled, label=label, **look, **shade)
+    axes.set_xscale("log")
+    title = f"{_style.first_upper(name)} by third octave, weighted by {weighting} (ISO 2631-1)"
+    _style.dress(axes, "frequency [Hz]", f"[{unit}]", title)
+    _style.plain_log_axis(axes.xaxis)
+
+
+def whole_spectrum(values: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
+    """The density of a whole record as one segment."""
+    found = metrics.power_spectral_density(values, dt, len(values), window="rectangular")
+    frequency, density = (np.asarray(a) for a in found)
+    return frequency, density

@@ -36,7 +36,7 @@ def pareto(
     """
     remedy = "The call is `pareto(front)` with the result of `tune.pareto`."
     _checks.instance("front", front, ParetoFront, "be a front", remedy)
-    marked = {"start": front.before}
+    marked = {"present (start)": front.before}
     if baselines:
         others = _style.by_name("baselines", baselines, AbstractVehicle, "a vehicle", "Give them as {'name': vehicle}.")
         marked |= {name: front.metrics_of(vehicle) for name, vehicle in others.items()}
@@ -70,9 +70,9 @@ def _points(axes: Axes, front: ParetoFront, x: str, y: str, marked: Mapping[str,
     )  # fmt: skip
     handles = [points, knee]
     for i, (name, values) in enumerate(marked.items()):
-        colour = _style.BLACK if name == "start" else _style.COLOURS[(i + 1) % len(_style.COLOURS)]
-        mark = MARKS[i % len(MARKS)]
-        handles.append(axes.scatter(values[x], values[y], 45.0, colour, marker=mark, label=name, zorder=4))
+        mark: _style.Look = {"color": _style.COLOURS[(i + 1) % len(_style.COLOURS)], "marker": MARKS[i % len(MARKS)]}
+        look = mark | (_style.PRESENT if i == 0 else {})
+        handles += axes.plot(values[x], values[y], label=_style.in_words(name), linestyle="", zorder=4, **look)
     handles += _limits(axes, front, x, y)
     _style.dress(axes, _label(front, x), _label(front, y), f"Front of {len(front)} designs")
     return handles

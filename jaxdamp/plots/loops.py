@@ -6,10 +6,11 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp._display import display
 from jaxdamp._tables import typeset_unit
 from jaxdamp._types import Figure
 from jaxdamp.bench import BenchRun, as_runs, last_steady_cycle
-from jaxdamp.identify import FitResult, VehicleFit
+from jaxdamp.identify import Comparison, FitResult, VehicleFit
 from jaxdamp.plots import _style
 
 
@@ -68,14 +69,63 @@ def fit_loops(result: FitResult, runs: BenchRun | Sequence[BenchRun] | None = No
     _style.dress(over_time, "time in the cycle, over its period [–]", label, "Residual over the cycle, means of 1/40")
     for axes in (loops, football, over_velocity):
         _style.cross(axes)
-        axes.locator_params(axis="x", nbins=7)
+        _style.few_ticks(axes, 7)
     _style.cross(over_time, vertical=False)
     styles = [
         Line2D([], [], color=_style.GREY, linewidth=4.0, alpha=0.4, label="measured"),
         Line2D([], [], color=_style.GREY, linewidth=1.3, label="fitted"),
     ]
-    _style.legend_beside(figure, styles + handles, "record (peak velocity)")
-    figure.suptitle(_title(result, runs, shown))
+    several = len(shown) > 1  # one has its name in the title
+    _style.legend_beside(figure, styles + handles * several, "record (peak velocity)" * several)
+    figure.suptitle(_title(result, runs, shown), x=0.01, ha="left", fontsize="medium")
+    return figure
+
+
+_MOST_LAWS = 12  # of small multiples
+
+
+def loops_by_law(comparison: Comparison, record: str | None = None) -> Figure:
+    """The same record in a small panel for each law, the best first: measured force and that of the law over velocity.
+
+    Arguments:
+        comparison: of `identify.compare`; of more than twelve laws the best are drawn, and the title says so.
+        record: name of a fitted record; the fastest if left out.
+
+    Raises:
+        ValueError: an unknown record.
+    """
+    remedy = "The call is `loops_by_law(comparison)` with the result of `identify.compare`."
+    _checks.instance("comparison", comparison, Comparison, "be a comparison of laws", remedy)
+    runs = comparison.best.result.runs
+    name = max(runs, key=lambda run: run.peak_velocity).name if record is None else record
+    _checks.one_of("record", name, [run.name for run in runs])
+    rungs = sorted(comparison.rungs, key=lambda rung: rung.error)
+    shown = rungs[:_MOST_LAWS]
+    columns = min(len(shown), 4)
+    figure = _style.new_figure(3.0 * columns, 0.8 + 2.5 * -(-len(shown) // columns))
+    panels = figure.subplots(-(-len(shown) // columns), columns, sharex=True, sharey=True, squeeze=False)
+    for axes, rung in zip(panels.flat, shown, strict=False):
+        number, run = next(pair for pair in enumerate(rung.result.runs) if pair[1].name == name)
+        force = rung.result.respond(tuple(rung.result.runs))[number]  # all at once, as they were compiled for the fit
+        cycle = np.arange(len(run))[last_steady_cycle(run)]
+        part = np.append(cycle, cycle[0])  # closed
+        axes.plot(run.velocity[part], run.force[part], label="measured", **(_style.REFERENCE | {"linewidth": 3.0}))
+        axes.plot(run.velocity[part], force[part], label="law", **_style.AFTER)
+        best = ", recommended" * (rung is comparison.best)
+        words = f"{_style.in_words(rung.name)}: {_style.short(rung.error)}\N{NO-BREAK SPACE}N{best}"
+        _style.dress(axes, _style.VELOCITY, "force [N]", words)
+        _style.cross(axes)
+        _style.few_ticks(axes, 4)
+        axes.label_outer()
+    for axes in panels.flat[len(shown) :]:
+        axes.set_axis_off()
+    for axes in panels.flat[max(len(shown) - columns, 0) : len(shown)]:
+        axes.set_xlabel(display().text(_style.VELOCITY))
+        axes.tick_params(labelbottom=True)
+    judged = "on motion held out" if comparison.best.judged_on else "on the fitted records"
+    few = f", the best {len(shown)} of {len(rungs)} laws" * (len(shown) < len(rungs))
+    words = f"{name}: measured (grey) and each law (blue), with its error {judged}{few}"
+    figure.suptitle(words, x=0.01, ha="left", fontsize="medium", wrap=True)
     return figure
 
 
@@ -83,7 +133,7 @@ def _title(result: FitResult, runs: Sequence[BenchRun], shown: Sequence[BenchRun
     own = runs is result.runs
     percent, rmse = (result.fit_percent, result.rmse) if own else result.score(runs)[:2]
     new = not any(run is fitted for run in runs for fitted in result.runs)
-    records = f"{len(runs)} record{'s' * (len(runs) > 1)}{' not fitted' * new}"
+    records = f"{runs[0].name if len(runs) == 1 else f'{len(runs)} records'}{' not fitted' * new}"
     score = f"{_style.law_name(result.law)}: fit {percent:.1f} %, RMSE {_style.short(rmse)} N on {records}"
     return score + (f"\n{len(shown)} of them shown, last full cycle of each" if len(shown) < len(runs) else "")
 

@@ -8,13 +8,14 @@ from jaxdamp.bench import Finding, Preflight
 from jaxdamp.plots import _style
 
 
-_SHADES = {"error": _style.BAD, "warning": _style.COLOURS[1], "note": _style.COLOURS[0]}
+_SHADES = {"error": _style.BAD, "warning": _style.COLOURS[1], "note": _style.COLOURS[0]}  # worst first
+_FEWEST = 3  # columns, of which a narrower picture would have too wide ones
 
 
 def preflight(found: Preflight) -> Figure:
-    """A row for each record, a column for each kind of finding, coloured by severity, with its size.
+    """A row for each record with findings, a column for each kind of them, the worst first, coloured by severity.
 
-    Where a record has several findings of a kind, the largest is shown and their number stands in brackets.
+    A cell has the size of the finding; of several of a kind the largest, and their number in brackets.
 
     Arguments:
         found: of `bench.preflight`.
@@ -22,13 +23,15 @@ def preflight(found: Preflight) -> Figure:
     from matplotlib.patches import Patch, Rectangle
 
     _checks.instance("found", found, Preflight, "be a preflight", "Take what `bench.preflight(runs)` gives.")
-    names = list(dict.fromkeys(finding.name for finding in found.findings))
-    figure = _style.new_figure(4.5 + 1.0 * max(len(names), 2), 2.0 + 0.34 * len(found.records))
+    worst_first = sorted(found.findings, key=lambda finding: list(_SHADES).index(finding.severity))
+    names = list(dict.fromkeys(finding.name for finding in worst_first))
+    records = [name for name in found.records if any(name in finding.records for finding in found.findings)]
+    figure = _style.new_figure(4.5 + 1.0 * max(len(names), 2), 2.0 + 0.34 * len(records))
     axes = figure.subplots()
     cells: dict[tuple[int, int], list[Finding]] = {}
     for finding in found.findings:
         for record in finding.records:
-            cells.setdefault((names.index(finding.name), found.records.index(record)), []).append(finding)
+            cells.setdefault((names.index(finding.name), records.index(record)), []).append(finding)
     for (x, y), findings in cells.items():
         worst = max(findings, key=lambda finding: abs(finding.size or 0.0))
         alpha = 0.25 + 0.2 * (worst.severity == "error")
@@ -36,16 +39,18 @@ def preflight(found: Preflight) -> Figure:
         text = "" if worst.size is None else _size(worst)
         axes.text(x, y, text + f" ({len(findings)})" * (len(findings) > 1), ha="center", va="center", fontsize="small")
     axes.set_xticks(range(len(names)), names, rotation=30, ha="left")
-    axes.set_yticks(range(len(found.records)), found.records)
+    axes.set_yticks(range(len(records)), records)
     axes.xaxis.tick_top()
-    axes.set_xlim(-0.5, max(len(names), 1) - 0.5)
-    axes.set_ylim(len(found.records) - 0.5, -0.5)
+    axes.set_xlim(-0.5, max(len(names), _FEWEST) - 0.5)
+    axes.set_ylim(max(len(records), 1) - 0.5, -0.5)
     axes.set_xticks(np.arange(len(names) + 1) - 0.5, minor=True)
-    axes.set_yticks(np.arange(len(found.records) + 1) - 0.5, minor=True)
+    axes.set_yticks(np.arange(len(records) + 1) - 0.5, minor=True)
     axes.grid(True, which="minor", color="0.9", linewidth=0.8)
     axes.tick_params(which="both", length=0)
     axes.spines[:].set_visible(False)
-    figure.suptitle(_style.said(found.summary))
+    clean = len(found.records) - len(records)
+    _style.note_below(figure, [f"{clean} of {len(found.records)} records without findings."] * bool(clean))
+    figure.suptitle(_style.said(found.summary), wrap=True)
     _style.legend_beside(figure, [Patch(color=colour, alpha=0.35, label=word) for word, colour in _SHADES.items()])
     return figure
 

@@ -7,7 +7,7 @@ import numpy as np
 from jaxdamp._display import display
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Figure
-from jaxdamp.plots import _ride_panels, _rides, _sheet, _style
+from jaxdamp.plots import _ride_panels, _ride_spectra, _rides, _sheet, _style
 from jaxdamp.simulation import Response
 from jaxdamp.tune import TuneResult
 
@@ -23,9 +23,10 @@ def ride_sheet(
     """One A4 page of a ride or a tuning, to print or to send: `result.plot("sheet")`.
 
     The vehicle with its numbers; its road among the classes of ISO 8608; comfort over grip with the curve of constant
-    damping; the dampers with the share of time at each velocity; the spectrum of the body with the bands of body and
-    wheels, or of a bump peaks, overshoot and settling; the changes of the main metrics, with whiskers over the roads
-    that the tuning had not seen, and marks at limits. Save it by `figure.savefig("ride.pdf")`.
+    damping; the dampers with their damping ratio and the share of time at each velocity; what reaches body and tyre
+    over frequency with the bands of body and wheels, and the weighted acceleration in third octaves, or of a bump
+    peaks, overshoot and settling; the changes of the main metrics, with whiskers over the roads that the tuning had not
+    seen, and marks at limits. Save it by `figure.savefig("ride.pdf")`.
 
     Arguments:
         rides: of `tune.minimise`, or of `simulate`, several by name: the first is compared with the last.
@@ -45,7 +46,7 @@ def ride_sheet(
         shown, answer = _rides.Rides.of_responses(by_name, limits), {}
     with _sheet.lettering():
         figure = _sheet.page()
-        rows = figure.add_gridspec(5, 1, height_ratios=(1.0, 1.9, 3.2, 3.0, 3.0), hspace=0.02)
+        rows = figure.add_gridspec(5, 1, height_ratios=(1.0, 1.9, 2.8, 4.0, 2.6), hspace=0.02)
         car = shown.cars[0]
         title = name or _style.first_upper("controlled " * (car.passive is not car) + _style.class_words(car.passive))
         top = figure.add_subplot(rows[0].subgridspec(1, 1)[0])
@@ -57,12 +58,19 @@ def ride_sheet(
         _ride_panels.plane(second[0], shown)
         _ride_panels.bars(second[1], shown)
         paths = shown.dampers()
-        third = rows[3].subgridspec(2, max(len(paths), 1), height_ratios=(2.4, 1.0))
+        ratio = all(_rides.critical(shown, path, number) for path in paths for number in (0, 1))
+        heights = (2.2, 1.1, 0.8) if ratio else (3.3, 0.8)
+        third = rows[3].subgridspec(len(heights), max(len(paths), 1), height_ratios=heights)
         for column, path in enumerate(paths):
             curves = figure.add_subplot(third[0, column])
-            _ride_panels.damper(curves, figure.add_subplot(third[1, column], sharex=curves), shown, path)
-        last = figure.add_subplot(rows[4].subgridspec(1, 1)[0])
-        _ride_panels.event(last, shown) if shown.is_event else _ride_panels.spectrum(last, shown)
+            below = [figure.add_subplot(third[row, column], sharex=curves) for row in range(1, len(heights))]
+            _ride_panels.damper([curves, *below], shown, path)
+        if shown.is_event:
+            _ride_spectra.event(figure.add_subplot(rows[4].subgridspec(1, 1)[0]), shown)
+        else:
+            last = [figure.add_subplot(at) for at in rows[4].subgridspec(1, 3)]
+            _ride_spectra.gains(last[:2], shown)
+            _ride_spectra.comfort(last[2], shown)
     return figure
 
 
@@ -75,7 +83,7 @@ def _changes(shown: _rides.Rides) -> str:
             change = _style.percent(100.0 * (after / before - 1.0)) if before else "–"
             said.append(f"{words} {_style.quantity(after, shown.units[names[0]]) if shown.single else change}")
     first, last = map(_style.in_words, shown.names)
-    return _style.first_upper(", ".join(said)) if shown.single else f"{last} against {first}: {', '.join(said)}"
+    return _style.first_upper(f"{last} against {first}: " * (not shown.single) + ", ".join(said))
 
 
 def _facts(shown: _rides.Rides) -> str:

@@ -10,6 +10,7 @@ from jaxdamp._tables import typeset_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Figure
 from jaxdamp.plots import _style, fitted_range
+from jaxdamp.plots.frequency import third_octaves, whole_spectrum
 from jaxdamp.rig import quasi_static
 from jaxdamp.simulation import Response
 from jaxdamp.vehicles import ChannelKind, Layout
@@ -18,7 +19,7 @@ from jaxdamp.vehicles import ChannelKind, Layout
 WINDOW = 3.0  # s, drawn over time: in more, wheel oscillations at 10 Hz cannot be distinguished
 _WORDS = {
     "sprung_acceleration": "body acceleration [m/s²]   (+ up)",
-    "stroke": "stroke [mm]   (+ rebound)",
+    "stroke": _style.STROKE,
     "dynamic_tyre_load": "dynamic tyre load [N]   (+ more load)",
 }
 
@@ -43,8 +44,8 @@ def ride(
         responses: a response, or responses by name, all of one kind of vehicle.
         channels: what to draw over time; the first one also as a spectrum. Left out, the acceleration of the body, the
             first stroke and the first dynamic tyre load.
-        weighting: a frequency weighting of ISO 2631-1, such as "Wk": the legend adds the weighted RMS, and of a single
-            response the spectrum weighted by it is drawn dotted.
+        weighting: a frequency weighting of ISO 2631-1, such as "Wk": the legend adds the weighted RMS, and a panel of
+            its own shows this in third octaves (`metrics.third_octave_rms`).
         window: part of the run to draw over time [s]; if left out, the whole run, or of a long one the 3 s around its
             largest first channel. The spectrum and the RMS are of the whole run.
         reference: name of the response to draw as a broad grey line beneath the others.
@@ -64,8 +65,9 @@ def ride(
     grid = figure.add_gridspec(len(channels), 2, width_ratios=(1.4, 1.0))
     rows = [figure.add_subplot(grid[0, 0])]
     rows += [figure.add_subplot(grid[i, 0], sharex=rows[0]) for i in range(1, len(channels))]
-    spectrum = figure.add_subplot(grid[:, 1])
-    handles, unit = [], _unit(first, channels[0])
+    right = grid[:, 1].subgridspec(2 if weighting else 1, 1, height_ratios=(1.6, 1.0)[: 2 if weighting else 1])
+    spectrum = figure.add_subplot(right[0])
+    handles, felt, unit = [], [], _unit(first, channels[0])
     styles = _style.ride_styles(list(responses), reference)
     for name, response in responses.items():
         style = styles[name]
@@ -82,9 +84,7 @@ def ride(
             dt = float(time[1] - time[0])
             weighted = metrics.weighted_rms(values, dt, weighting, method="step", remove_mean=False)
             label += f", weighted by {weighting} {_style.short(float(weighted))} {unit}"
-            gain = np.asarray(metrics.weighting_factor(frequency, weighting))
-            if len(responses) == 1:  # more lines nobody can tell apart
-                spectrum.loglog(frequency, gain**2 * density, ":", color=style["color"], linewidth=1.1)
+            felt.append(("_", style, whole_spectrum(values, dt)))
         handles += spectrum.loglog(frequency, density, label=label, **style)
     for axes, channel in zip(rows, channels, strict=True):
         fitted_range.shade_channel(axes, responses.values(), channel)
@@ -95,11 +95,11 @@ def ride(
     rows[-1].set_xlabel("time [s]")
     rows[0].set_xlim(start, stop)
     name = _label(first, channels[0]).split(" [")[0]
-    dotted = f", dotted: weighted by {weighting}" if weighting and len(responses) == 1 else ""
-    words = f"Spectrum of the {name}{dotted}"
-    _style.dress(spectrum, "frequency [Hz]", f"power spectral density [({unit})²/Hz]", words)
+    _style.dress(spectrum, "frequency [Hz]", f"power spectral density [({unit})²/Hz]", f"Spectrum of the {name}")
     _style.plain_log_axis(spectrum.xaxis)
     spectrum.set_xlim(*frequencies)
+    if weighting is not None:
+        third_octaves(figure.add_subplot(right[1]), felt, weighting, unit, name)
     _style.legend_above(figure, handles)
     low, high = spectrum.get_ylim()
     spectrum.set_ylim(max(low, 1e-6 * high), high)  # far below, a spectrum shows the window that it was estimated with
@@ -214,8 +214,8 @@ def damper_use(responses: Response | Mapping[str, Response], *, damper: str | No
     words = f"{_style.first_upper(damper.replace('_', ' '))}: law (thick) and its forces in the ride (thin)"
     _style.dress(trace, _style.VELOCITY, _style.FORCE, words)
     _style.cross(trace)
-    _style.dress(time_share, "velocity [m/s]", "share of time [%]", f"Time, {reach / _BINS * 2:.2g} m/s a step")
-    _style.dress(energy_share, "velocity [m/s]", "share of dissipated energy [%]", "Energy")
+    _style.dress(time_share, _style.VELOCITY, "share of time [%]", f"Time, {reach / _BINS * 2:.2g} m/s a step")
+    _style.dress(energy_share, _style.VELOCITY, "share of dissipated energy [%]", "Energy")
     if len(responses) > 1 or shaded[0]:
         _style.legend_above(figure, handles)
     _style.note_below(figure, gaps)

@@ -97,7 +97,7 @@ def record_sensitivity(result: RecordSensitivity) -> Figure:
         for number, (record, slopes) in enumerate(zip(result.records, result.by_sample[name], strict=True)):
             colour = _style.COLOURS[number % len(_style.COLOURS)]
             axes.plot(result.velocity[number], 10.0 * slopes, ".", ms=2.5, color=colour, label=record)
-        _style.dress(axes, "velocity, rebound positive [m/s]", "change for 10 N more in one sample", name)
+        _style.dress(axes, _style.VELOCITY, "change for 10 N more in one sample", name)
         _style.cross(axes)
         if column == 0 and len(result.records) <= MOST:
             axes.legend()

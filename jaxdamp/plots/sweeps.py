@@ -15,7 +15,9 @@ from jaxdamp.tune import limit_spans
 
 LEVELS = 14  # of a map
 MOST_CURVES = 6
-LABEL_LENGTH = 36  # characters, of two labels beside each other above a picture
+PRESENT: _style.Look = {"label": "present", "linestyle": "", "clip_on": False, "zorder": 5.0} | _style.PRESENT
+ON_COLOURS: _style.Look = {"color": "white", "markeredgecolor": _style.BLACK}  # of a mark in a map
+BEST: _style.Look = {"linestyle": "", "clip_on": False, "zorder": 4.5} | _style.BEST | ON_COLOURS
 HATCHES = ("////", "\\\\\\\\", "xxxx", "....")
 
 
@@ -24,18 +26,25 @@ def sweep(
     metric: str,
     over: Sequence[str] | None = None,
     *,
+    against: str | None = None,
     limits: Mapping[str, object] | None = None,
+    present: Mapping[str, object] | None = None,
 ) -> Figure:
     """A result of a sweep over a grid: a curve for one axis, a map for two; failed points are marked.
 
-    Where a limit is violated, a map is hatched, and points of curves are ringed.
+    Where a limit is violated, a map is hatched, and points of curves are ringed. The best point is a star, and the
+    present design a filled circle. `against` another result, the points are drawn in the plane of both, such as that of
+    comfort and grip, with a line for each value of the first axis and red crosses at points beyond the limits.
 
     Arguments:
         data: of `jaxdamp.sweep`, over a grid.
         metric: one of its results.
         over: one axis, or two, the first along the abscissa. Left out, all there are. Fix other axes before, such as
             by `data.sel({"sprung_mass": 1200.0})`; of up to six values of one more axis, each gets a curve.
+        against: another result, along the ordinate of the plane of both.
         limits: `{result: largest value}` or `{result: (smallest, largest)}`, of this or other results.
+        present: the design that there is, by the names of axes and results: `{"damper.rate": 1500.0, **ride()}`. It is
+            marked in a map or on curves where its values of all axes are known, in a plane where both results are.
 
     Raises:
         ValueError: an unknown result or axis; a result that is not one number for each point; too many axes.
@@ -51,16 +60,23 @@ def sweep(
     spans = limit_spans(limits, names)
     for name in spans:
         _checks.one_of("limits", name, names)
+    known = {name: float(_checks.plain_number(f"present[{name!r}]", value)) for name, value in (present or {}).items()}
+    ends = _ends(data, spans)
     figure = _style.new_figure(7.0, 4.6)
     plot = figure.add_subplot()
     over_axes = " and ".join(_words(data, name) for name in axes)
     idle = without_effect(data).get(metric, [])
     flat = f" (no effect of {' and '.join(_words(data, name) for name in idle)})" if idle else ""
-    plot.set_title(f"{_words(data, metric)} over {over_axes}{flat}", loc="left", fontsize="medium")
-    if len(chosen) == 1:
-        _curves(figure, plot, data, metric, chosen[0], others, _ends(data, spans))
+    what = _words(data, metric) if against is None else "Designs"
+    _style.dress(plot, "", "", _style.first_upper(f"{what} over {over_axes}{flat}"))
+    if against is not None:
+        if (other := _grid_axes(data, against, "against")) != axes:
+            _checks.refuse("against", f"be a result over {axes}", f"{against!r} over {other}")
+        _plane(figure, plot, data, metric, against, chosen, ends, known)
+    elif len(chosen) == 1:
+        _curves(figure, plot, data, metric, chosen[0], others, ends, known)
     else:
-        _map(figure, plot, data, metric, chosen, _ends(data, spans))
+        _map(figure, plot, data, metric, chosen, ends, known)
     return figure
 
 
@@ -79,13 +95,13 @@ def _chosen_axes(
     return chosen, others
 
 
-def _grid_axes(data: Dataset, metric: str) -> list[str]:
+def _grid_axes(data: Dataset, metric: str, argument: str = "metric") -> list[str]:
     """The axes of a result that is one number for each point of a grid."""
-    _checks.one_of("metric", metric, [str(name) for name in data.data_vars])
+    _checks.one_of(argument, metric, [str(name) for name in data.data_vars])
     axes = [str(name) for name in data[metric].dims]
     if "point" in axes or not all(name in data.coords for name in axes) or data[metric].dtype.kind != "f":
         remedy = "Points of a list or sample are best drawn by `data.plot.scatter`."
-        _checks.refuse("metric", "be one number for each point of a grid", f"{metric!r} along {axes}", remedy)
+        _checks.refuse(argument, "be one number for each point of a grid", f"{metric!r} along {axes}", remedy)
     return axes
 
 
@@ -97,6 +113,7 @@ def _curves(
     name: str,
     others: list[str],
     ends: Sequence["_End"],
+    present: Mapping[str, float],
 ) -> None:
     """A curve over one axis, for each value of another; a cross at the foot where points failed."""
     lines = data[metric].transpose(*others, name).values.reshape(-1, data.sizes[name])
@@ -116,8 +133,12 @@ def _curves(
         marks.append(plot.scatter(places, lines[beyond], size, "none", edgecolors=colour, label=end.label, zorder=4))
         if end.name == metric:
             plot.axhline(end.value, color=colour, linestyle="--", linewidth=1.0)
+    if name in present:
+        marks += _mark_present(plot, data, [name], present, (present[name], present.get(metric, np.nan)))
+        plot.axvline(present[name], color=_style.BLACK, linestyle=":", linewidth=1.0)
+        plot.set_xlim(*_widened(where))
     if marks:
-        _style.legend_above(figure, marks, _legend_columns(marks))
+        _style.legend_above(figure, marks, 2)
     if failed.any():
         crossed = where[failed.any(axis=0)]
         foot = np.zeros(len(crossed))
@@ -133,6 +154,7 @@ def _map(
     metric: str,
     over: list[str],
     ends: Sequence["_End"],
+    present: Mapping[str, float],
 ) -> None:
     """Filled contours over two axes, the smallest value, lines of so much more; crosses where points failed."""
     x, y = (data[name].values for name in over)
@@ -152,7 +174,7 @@ def _map(
             label = f"smallest{' within the limits' * bool(beyond)}: {_style.short(smallest)}{_unit(data, metric)}"
             label += ", at the edge: widen the grid" * edge
             _more_than(plot, x, y, shown, smallest)
-            plot.plot(x[column], y[row], "o", color="white", markeredgecolor=_style.BLACK, label=label, clip_on=False)
+            plot.plot(x[column], y[row], label=label, **BEST)
         else:
             plot.plot([], [], " ", label="no point within the limits")
     hatched = [
@@ -162,12 +184,74 @@ def _map(
         plot.patch.set(facecolor="0.95", edgecolor="0.75", hatch="///")
         rows, columns = np.nonzero(failed)
         plot.plot(x[columns], y[rows], "x", color=_style.BLACK, markersize=4.0, label="failed", clip_on=False)
+    _mark_present(plot, data, over, present, tuple(present.get(name, np.nan) for name in over))
     _style.dress(plot, _label(data, over[0]), _label(data, over[1]))
     plot.grid(False)
     plot.set_xlim(x.min(), x.max())
     plot.set_ylim(y.min(), y.max())
     handles = [*plot.get_legend_handles_labels()[0], *hatched]
-    _style.legend_above(figure, handles, _legend_columns(handles))
+    _style.legend_above(figure, handles, 2)
+
+
+def _mark_present(
+    plot: Axes, data: Dataset, over: list[str], present: Mapping[str, float], place: tuple[float, ...]
+) -> list:
+    """A filled circle at the present design if it is known, or words in the legend that it is outside the grid."""
+    if not all(name in present for name in over):
+        return []
+    if all(data[name].min() <= present[name] <= data[name].max() for name in over):
+        return plot.plot(*place, **PRESENT)
+    where = ", ".join(f"{_style.short(present[name])}{_unit(data, name)}" for name in over)
+    return plot.plot([], [], " ", label=f"present outside the grid: {where}")
+
+
+def _widened(values: np.ndarray) -> tuple[float, float]:
+    """The ends of an axis with 5 % more on each side."""
+    return float(values.min() - 0.05 * np.ptp(values)), float(values.max() + 0.05 * np.ptp(values))
+
+
+def _plane(
+    figure: Figure,
+    plot: Axes,
+    data: Dataset,
+    metric: str,
+    against: str,
+    over: list[str],
+    ends: Sequence["_End"],
+    present: Mapping[str, float],
+) -> None:
+    """Points in the plane of two results, coloured by the first axis, and those that no other one beats in both."""
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+
+    x, y = (data[name].transpose(*over).values.reshape(data.sizes[over[0]], -1) for name in (metric, against))
+    beyond = [end.beyond(data[end.name].transpose(*over).values.reshape(x.shape)) for end in ends]
+    forbidden = np.any(beyond, axis=0) if beyond else np.zeros(x.shape, bool)
+    for across, up in zip(x, y, strict=True) if x.shape[1] > 1 else [(x[:, 0], y[:, 0])]:
+        plot.plot(across, up, color="0.7", linewidth=0.8, zorder=1)
+    shades = np.broadcast_to(data[over[0]].values[:, None], x.shape)
+    points = plot.scatter(x, y, 22.0, shades, cmap=ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.75, 256))))
+    figure.colorbar(points, ax=plot, label=_label(data, over[0]))
+    handles = []
+    if forbidden.any():
+        label = "\n".join(end.label for end in ends)
+        handles += plot.plot(x[forbidden], y[forbidden], "x", color=_style.BAD, markersize=7.0, label=label)
+    allowed = np.isfinite(x) & np.isfinite(y) & ~forbidden
+    best = _unbeaten(x[allowed], y[allowed])
+    look: _style.Look = _style.AFTER | {"linewidth": 1.2, "marker": "."}
+    handles += plot.plot(*best, label="no point is better in both", **look)
+    if metric in present and against in present:
+        handles += plot.plot(present[metric], present[against], **PRESENT)
+    _style.dress(plot, _label(data, metric), _label(data, against))
+    _style.legend_above(figure, handles, 2)
+
+
+def _unbeaten(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The points than which no other one is smaller in both, by the first."""
+    order = np.lexsort((y, x))
+    x, y = x[order], y[order]
+    kept = y < np.minimum.accumulate(np.append(np.inf, y))[:-1]
+    return x[kept], y[kept]
 
 
 def _more_than(plot: Axes, x: np.ndarray, y: np.ndarray, values: np.ma.MaskedArray, smallest: float) -> None:
@@ -177,11 +261,6 @@ def _more_than(plot: Axes, x: np.ndarray, y: np.ndarray, values: np.ma.MaskedArr
         heights = [smallest * (1.0 + share / 100.0) for share in levels]
         lines = plot.contour(x, y, values, heights, colors="white", linewidths=0.8)
         plot.clabel(lines, fmt=dict(zip(heights, map(_style.percent, levels), strict=True)), fontsize="small")
-
-
-def _legend_columns(handles: Sequence[Any]) -> int:
-    """Two, if their labels fit beside each other."""
-    return 2 if max((len(str(handle.get_label())) for handle in handles), default=0) <= LABEL_LENGTH else 1
 
 
 class _End(NamedTuple):

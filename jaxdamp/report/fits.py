@@ -148,6 +148,7 @@ def add_fits(
     report.points(failure_sentences(comparison) if failures is None else failures)
     if several:
         report.picture(lambda: plots.ladder(comparison), "Errors of the laws", "ladder.png")
+        report.picture(lambda: comparison.plot("loops"), "One record and each law", "loops_by_law.png")
     report.heading(f"The recommended law: {best.name}" if several else best.name)
     report.table(parameters_of(best))
     if best.judged_on:

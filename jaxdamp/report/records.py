@@ -41,7 +41,12 @@ def records_table(runs: Sequence[BenchRun], held_out: Sequence[BenchRun] = ()) -
         runs: the records.
         held_out: those of them that are not fitted.
     """
-    columns = [Column("record"), Column("rate", "Hz"), Column("motion", "Hz", ".3g"), Column("0-peak", "mm", ".3g")]
+    columns = [
+        Column("record"),
+        Column("sampling", "Hz"),
+        Column("frequency", "Hz", ".3g"),
+        Column("amplitude", "mm", ".3g"),
+    ]
     columns += [Column("peak velocity", "m/s", ".3g"), Column("least force", "N", ".0f")]
     columns += [Column("largest force", "N", ".0f"), Column("work per cycle", "J", ".3g"), Column("cycles")]
     columns += [Column("use")] if held_out else []
@@ -50,7 +55,7 @@ def records_table(runs: Sequence[BenchRun], held_out: Sequence[BenchRun] = ()) -
     for run in runs:
         row: tuple[Cell, ...] = (run.name, run.sampling_rate, run.frequency, 1e3 * run.amplitude, run.peak_velocity)
         row += (float(run.force.min()), float(run.force.max()), run.work_per_cycle, run.cycles)
-        rows.append(row + ("held out" if run.name in names else "fitted",) * bool(held_out))
+        rows.append(row + ("held\N{NO-BREAK SPACE}out" if run.name in names else "fitted",) * bool(held_out))
     return Table("Records (stroke and velocity positive in rebound)", tuple(columns), tuple(rows))
 
 

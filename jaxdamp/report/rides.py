@@ -3,11 +3,15 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from jaxdamp import plots
 from jaxdamp._display import display
 from jaxdamp._tables import Table, percent_change, typeset_unit
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp._words import path_words
+from jaxdamp.dampers import AbstractDamper, law_name
 from jaxdamp.metrics import comfort_reaction
+from jaxdamp.parameters import parameters
 from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.page import Report
 from jaxdamp.report.records import range_use_table
@@ -56,9 +60,18 @@ def ride_report(
     report.points(notes_of(rides) if remarks is None else remarks)
     for name, law in (laws or {}).items():
         covered = f" Fitted to: {law.fitted_to.words()}." if law.fitted_to is not None else ""
-        report.text(f"{name}: {law!r}{'.' * bool(covered)}{covered}")
+        report.text(f"{name}: {_numbers(law)}.{covered}")
     add_rides(report, rides, title)
     return report
+
+
+def _numbers(law: AbstractDamper) -> str:
+    """The name of a law with its numbers and their units."""
+    said = []
+    for one in parameters(law):
+        numbers = ", ".join(f"{number:.5g}" for number in np.ravel(one.value))
+        said.append(f"{path_words(one.path)} {numbers} {typeset_unit(one.unit)}".rstrip())
+    return f"{law_name(law)}, {', '.join(said)}" if said else law_name(law)
 
 
 def add_rides(report: Report, responses: Mapping[str, Response], title: str, prefix: str = "") -> None:

@@ -1,5 +1,6 @@
 """A page on a sweep: a table of all points, and a curve or a map of each result."""
 
+import functools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,8 @@ def sweep_report(
     remarks: Sequence[str] = (),
     limits: Mapping[str, object] | None = None,
     baseline: Mapping[str, object] | None = None,
+    present: Mapping[str, object] | None = None,
+    plane: tuple[str, str] | None = None,
     folder: Path | None = None,
     attempts: Attempts | None = None,
 ) -> Report:
@@ -36,6 +39,8 @@ def sweep_report(
         remarks: on the results, such as the reasons of failed points.
         limits: `{result: largest value}` or `{result: (smallest, largest)}`; hatched in maps, ringed on curves.
         baseline: results of another design by name, to which the best points are compared.
+        present: the design that there is, by the names of axes and results, to be marked in the pictures.
+        plane: two results that are drawn against each other, such as those of comfort and grip.
         folder: folder for the pictures as separate files; without it they are only in the page.
         attempts: collects parts that fail; a new one if left out.
 
@@ -50,7 +55,11 @@ def sweep_report(
     if len(data["failed"].dims) <= MOST_AXES:
         for name in data.data_vars:
             metric = str(name)
-            report.picture(lambda m=metric: plots.sweep(data, m, limits=limits), path_words(metric), f"{metric}.png")
+            draw = functools.partial(plots.sweep, data, metric, limits=limits, present=present)
+            report.picture(draw, path_words(metric), f"{metric}.png")
+        if plane is not None:
+            draw = functools.partial(plots.sweep, data, plane[0], against=plane[1], limits=limits, present=present)
+            report.picture(draw, " and ".join(map(path_words, plane)), "plane.png")
     else:
         report.text(f"Grids of more than {MOST_AXES} axes are not drawn.")
     report.table(data.jaxdamp.table().first(MOST_POINTS))

@@ -118,12 +118,12 @@ def _add_fit(report: Report, result: VehicleFit, remarks: Sequence[str] | None) 
 
 
 def ride_records_table(records: Sequence[RideRecord]) -> Table:
-    """Records of a vehicle with their length, rate, input and channels.
+    """Records of a vehicle with their length, sampling rate, input and channels.
 
     Arguments:
         records: of `bench.read_rides`, or virtual ones.
     """
-    columns = [Column("record"), Column("length", "s", ".4g"), Column("rate", "Hz", ".6g"), Column("wheels")]
+    columns = [Column("record"), Column("length", "s", ".4g"), Column("sampling", "Hz", ".6g"), Column("wheels")]
     columns += [Column("moved by"), Column("measured")]
     rows = []
     for record in records:

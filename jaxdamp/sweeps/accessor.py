@@ -1,7 +1,7 @@
 """What a sweep's `xarray.Dataset` can do: `data.jaxdamp.table()`, `.to_dict()`, `.plot(metric)`."""
 
 from collections.abc import Sequence
-from typing import final
+from typing import Any, final
 
 import numpy as np
 import xarray
@@ -84,11 +84,17 @@ class SweepResults:
         """As `Dataset.to_dict`, ready for JSON: numbers that are not finite are None."""
         return plain(self._data.to_dict())
 
-    def plot(self, metric: str, over: Sequence[str] | None = None) -> Figure:
-        """A result over one axis as a curve, over two as a map (`plots.sweep`)."""
+    def plot(self, metric: str, over: Sequence[str] | None = None, **options: Any) -> Figure:
+        """A result over one axis as a curve, over two as a map, or the plane of two results.
+
+        Arguments:
+            metric: one of the results.
+            over: one axis or two; all there are if left out.
+            options: of `plots.sweep`, such as `against="rms_dynamic_tyre_load"`.
+        """
         from jaxdamp.plots import sweep
 
-        return sweep(self._data, metric, over)
+        return sweep(self._data, metric, over, **options)
 
 
 def _cell(value: object) -> object:

@@ -3,7 +3,7 @@
 - Ready-made: `QuarterCar`, `HalfCar`, `RollCar`, `FullCar`, `TandemTruck`, `TrackedHull`, built from `Corner`, `Axle`,
   `WalkingBeam` or `IndependentTandem`, `Cab`, `Seat`, `Place`; published sets are in `vehicles.presets`.
 - Your own: a `LumpedVehicle` from a `Frame` of `Body`, `Link` and `Wheel` parts (`docs/vehicles.md`).
-- Analysis: `static_equilibrium`, `modes`, `linearise`, `frequency_response`, `stationary_rms`,
+- Analysis: `static_equilibrium`, `modes`, `critical_damping`, `linearise`, `frequency_response`, `stationary_rms`,
   `spectral_rms`; in time, `jaxdamp.simulate`.
 
 z is up, pitch positive nose up, roll positive left side up.
@@ -16,6 +16,7 @@ from jaxdamp.vehicles.cars import FullCar, HalfCar, QuarterCar, RollCar
 from jaxdamp.vehicles.channels import Channel as Channel, ChannelKind as ChannelKind
 from jaxdamp.vehicles.chosen_metrics import GOALS as GOALS, is_stationary as is_stationary
 from jaxdamp.vehicles.corner import Axle, Corner
+from jaxdamp.vehicles.critical import CriticalDamping as CriticalDamping, critical_damping
 from jaxdamp.vehicles.equilibrium import (
     refuse_restless as refuse_restless,
     rest_position as rest_position,
@@ -81,6 +82,7 @@ __all__ = [
     "TrackedHull",
     "WalkingBeam",
     "Wheel",
+    "critical_damping",
     "equivalent_dampers",
     "frequency_response",
     "linearise",

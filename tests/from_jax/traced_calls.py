@@ -251,6 +251,7 @@ SAMPLES: dict[str, dict[str, list[Call]]] = {
         "spectral_moments": [lambda f, x: f(F, F * x)],
         "temperature_rise": [lambda f, x: f(x, x, 5e3, 10.0)],
         "total_vibration": [lambda f, x: f({"seat_x": W * x}, 1e-3), lambda f, x: f({"seat_x": W}, 1e-3 * x)],
+        "third_octave_rms": [lambda f, x: f(F, F * x), lambda f, x: f(F * x, F)],
         "transmissibility": [lambda f, x: f(W * x, X, 1e-3), lambda f, x: f(W, X, 1e-3 * x)],
         "velocity_histogram": [lambda f, x: f(V * x, [-1.0, 0.0, 1.0]), lambda f, x: f(V, np.arange(3.0) * x)],
         "vibration_total_value": [lambda f, x: f({"seat_x": x, "seat_z": x})],
@@ -296,6 +297,7 @@ SAMPLES: dict[str, dict[str, list[Call]]] = {
         "records": [lambda f, x: f([run(x)])],
         "ride": [lambda f, x: f(response(x))],
         "damper_use": [lambda f, x: f(response(x))],
+        "damping_ratio": [lambda f, x: f(car(x)), lambda f, x: f(car(1.0), W * x)],
         "gas_and_friction": [lambda f, x: f(bench.separate_gas_and_friction(run(x)))],
     },
     "rig": {
@@ -404,6 +406,7 @@ SAMPLES: dict[str, dict[str, list[Call]]] = {
         "valving": [lambda f, x: f(law(x), dampers.MonoTube.reference())],
     },
     "vehicles": {
+        "critical_damping": [lambda f, x: f(car(x))],
         "equivalent_dampers": [lambda f, x: f(car(x)), lambda f, x: f(car(1.0), x)],
         "frequency_response": [lambda f, x: f(car(x), F), lambda f, x: f(car(1.0), F * x)],
         "linearise": [

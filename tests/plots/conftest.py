@@ -16,6 +16,8 @@ from jaxdamp.tune.front import FrontParameter
 from jaxdamp.tune.measuring import Measurement
 
 
+PRESENT = {"damper.rate": 1800.0, "spring_rate": 21e3, "weighted_rms_sprung_acceleration": 0.76}
+PRESENT |= {"rms_dynamic_tyre_load": 502.0}
 COMFORT, GRIP = "weighted_rms_sprung_acceleration", "rms_dynamic_tyre_load"
 
 
@@ -119,6 +121,7 @@ def figures(
         "ladder": comparison.plot(),
         "errors of held-out records": validation.plot(),
         "loops": best.plot(),
+        "loops by law": comparison.plot("loops"),
         "cycles": evaluation.plot(),
         "ride": plots.ride(responses, weighting="Wk"),
         "damper use": plots.damper_use(responses),
@@ -127,6 +130,8 @@ def figures(
             {"besinger_lag": best.law, "bilinear": Bilinear(2000.0, 1500.0)}, runs=list(runs), baseline="bilinear"
         ),
         "law card": plots.law_card(BoucWen(800.0, 2000.0, 300.0, 2e-3), frequencies=(1.0, 4.0)),
-        "sweep map": plots.sweep(swept, COMFORT, limits={GRIP: 640.0}),
+        "sweep map": plots.sweep(swept, COMFORT, limits={GRIP: 640.0}, present=PRESENT),
+        "plane": plots.sweep(swept, COMFORT, against=GRIP, limits={GRIP: 640.0}, present=PRESENT),
+        "damping ratio": plots.damping_ratio({name: one.vehicle for name, one in responses.items()}),
         "front": plots.pareto(front),
     }

@@ -39,6 +39,9 @@ VISIONS = {
     "deuteranopia": np.array([[0.3674, 0.8606, -0.2280], [0.2801, 0.6725, 0.0474], [-0.0118, 0.0429, 0.9689]]),
     "tritanopia": np.array([[1.2555, -0.0767, -0.1788], [-0.0784, 0.9308, 0.1476], [0.0047, 0.6914, 0.3039]]),
 }
+WIDTHS = (0.65, 1.5)  # of the usual one
+SMALL, CELL, DARKER = 200, 4, 24.0  # pixels of a small figure and of a square in it, of 255
+MOVED, MOVED_BY_ANOTHER_VERSION = 0.002, 0.08  # share of squares
 TO_XYZ = np.array([[0.4125, 0.3576, 0.1804], [0.2127, 0.7152, 0.0722], [0.0193, 0.1192, 0.9503]])
 
 
@@ -61,10 +64,12 @@ def lab(rgb: np.ndarray) -> np.ndarray:
 def texts(figure: Figure) -> Iterator[Text]:
     figure.draw_without_rendering()
     beyond = set()  # labels of ticks outside the axes, which are not drawn
-    for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
+    every_axes = [each for axes in figure.axes for each in (axes, *axes.child_axes)]
+    for axis in (axis for axes in every_axes for axis in (axes.xaxis, axes.yaxis)):
         low, high = sorted(axis.get_view_interval())
         ticks = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
-        beyond |= {id(tick.label1) for tick in ticks if not low <= tick.get_loc() <= high}
+        outside = [tick for tick in ticks if not low <= tick.get_loc() <= high]
+        beyond |= {id(label) for tick in outside for label in (tick.label1, tick.label2)}
     every = (text for text in figure.findobj(Text) if isinstance(text, Text) and id(text) not in beyond)
     return (text for text in every if text.get_visible() and text.get_text().strip())
 
@@ -119,14 +124,42 @@ def test_no_code_is_printed(figures: dict[str, Figure], runs: BenchSet) -> None:
         assert not bad, (name, bad)
 
 
-def test_no_text_leaves_the_page(figures: dict[str, Figure]) -> None:
+def is_page(name: str) -> bool:
+    return "sheet" in name or name == "one ride"
+
+
+@contextlib.contextmanager
+def at_width(figure: Figure, share: float) -> Iterator[Figure]:
+    """A figure at a share of its width, as narrow pages and wide screens have it."""
+    width, height = figure.get_size_inches()
+    figure.set_size_inches(share * width, height)
+    yield figure
+    figure.set_size_inches(width, height)
+
+
+def check_text(name: str, figure: Figure) -> None:
+    """No text leaves the page, and none lies on another."""
+    page, boxes = figure.bbox, [(text.get_text(), text.get_window_extent()) for text in texts(figure)]
+    for text, box in boxes:
+        assert box.x0 >= page.x0 - 1 and box.x1 <= page.x1 + 1, (name, text)
+        assert box.y0 >= page.y0 - 1 and box.y1 <= page.y1 + 1, (name, text)
+    for (one, a), (other, b) in itertools.combinations(boxes, 2):
+        wide, high = min(a.x1, b.x1) - max(a.x0, b.x0), min(a.y1, b.y1) - max(a.y0, b.y0)
+        lesser = min(a.width * a.height, b.width * b.height)
+        assert wide <= 0.0 or high <= 0.0 or wide * high <= 0.1 * lesser, (name, one, other)
+
+
+def test_text_has_its_place(figures: dict[str, Figure]) -> None:
     for name, figure in figures.items():
-        if "sheet" in name or name == "one ride":
-            page = figure.bbox
-            for text in texts(figure):
-                box = text.get_window_extent()
-                assert box.x0 >= page.x0 - 1 and box.x1 <= page.x1 + 1, (name, text.get_text())
-                assert box.y0 >= page.y0 - 1 and box.y1 <= page.y1 + 1, (name, text.get_text())
+        check_text(name, figure)
+
+
+@pytest.mark.slow
+def test_text_has_its_place_in_narrow_and_wide_figures(figures: dict[str, Figure]) -> None:
+    for name, figure in figures.items():
+        for share in () if is_page(name) else WIDTHS:
+            with at_width(figure, share):
+                check_text(f"{name} at {share:g} of its width", figure)
 
 
 def test_a_sheet_says_the_verdict_that_the_result_has(comparison: Comparison, tuned: TuneResult) -> None:
@@ -136,15 +169,6 @@ def test_a_sheet_says_the_verdict_that_the_result_has(comparison: Comparison, tu
     assert tuned.verdict.outcome.value in said
     with pytest.raises(ValueError, match="sheet"):
         tuned.plot("sheat")
-
-
-def test_no_text_lies_on_another(figures: dict[str, Figure]) -> None:
-    for name, figure in figures.items():
-        boxes = [(text.get_text(), text.get_window_extent()) for text in texts(figure)]
-        for (one, a), (other, b) in itertools.combinations(boxes, 2):
-            wide, high = min(a.x1, b.x1) - max(a.x0, b.x0), min(a.y1, b.y1) - max(a.y0, b.y0)
-            lesser = min(a.width * a.height, b.width * b.height)
-            assert wide <= 0.0 or high <= 0.0 or wide * high <= 0.1 * lesser, (name, one, other)
 
 
 # ---- golden pictures
@@ -165,7 +189,7 @@ def panels(figure: Figure) -> Image.Image:
     figure.set_layout_engine(engine)
     whole = Image.open(written).convert("RGB")
     every = [axes for axes in figure.axes if axes.get_label() != "<colorbar>"]
-    width = int((90_000 / len(every)) ** 0.5) // 12 * 12
+    width = max(int((90_000 / len(every)) ** 0.5) // 12 * 12, 108)
     below = Image.new("RGB", (width, 3 * width // 4 * len(every)))
     for number, axes in enumerate(every):
         box = axes.get_window_extent()
@@ -216,8 +240,69 @@ def test_the_pictures_are_drawn_as_before(figures: dict[str, Figure]) -> None:
 def test_a_curve_that_is_missing_or_has_another_colour_is_noticed(name: str, figures: dict[str, Figure]) -> None:
     blue = _style.AFTER["color"]
     lines = [line for axes in figures[name].axes for line in axes.get_lines() if line.get_color() == blue]
+    lines = [line for line in lines if np.size(line.get_xdata()) > 10]  # not of the sketch of a vehicle
     line = next(line for line in lines if line.get_linestyle() == "-" and line.get_linewidth() > 1.3)
     for change, back in (({"visible": False}, {"visible": True}), ({"color": "#D55E00"}, {"color": blue})):
         line.set(**change)
         assert changed(golden(name), panels(figures[name])) > TOLERATED, change
         line.set(**back)
+
+
+# ---- whole figures at three widths
+
+
+def layout(name: str, figure: Figure) -> Image.Image:
+    """A figure with its text, small and grey, at its usual width and narrow and wide; a page at its own."""
+    small = []
+    for share in (1.0,) if is_page(name) else (1.0, *WIDTHS):
+        with at_width(figure, share) as resized, io.BytesIO() as written:
+            resized.savefig(written, dpi=50)
+            whole = Image.open(written).convert("L")
+            size = (SMALL, round(SMALL * whole.height / whole.width / CELL) * CELL)
+            small.append(whole.resize(size, Image.Resampling.BOX))
+    below = Image.new("L", (SMALL, sum(one.height for one in small)))
+    for number, one in enumerate(small):
+        below.paste(one, (0, sum(above.height for above in small[:number])))
+    return below
+
+
+def moved(before: Image.Image, drawn: Image.Image) -> float:
+    """The share of squares of 4 × 4 pixels that are lighter or darker."""
+    assert before.size == drawn.size
+    cells = [
+        np.asarray(one.convert("L"), float).reshape(one.height // CELL, CELL, SMALL // CELL, CELL).mean(axis=(1, 3))
+        for one in (before, drawn)
+    ]
+    return float((np.abs(cells[0] - cells[1]) > DARKER).mean())
+
+
+@pytest.mark.slow
+def test_whole_figures_are_as_before_at_three_widths(figures: dict[str, Figure]) -> None:
+    """`JAXDAMP_REDRAW=1 pytest -m slow tests/plots/test_house_style.py` draws them anew: look at each."""
+    for name, figure in figures.items():
+        path, drawn = GOLDEN / "layouts" / f"{name.replace(' ', '_')}.png", layout(name, figure)
+        if "JAXDAMP_REDRAW" in os.environ:
+            notes = PngInfo()
+            notes.add_text("matplotlib", VERSION)
+            drawn.point([round(grey / 17) * 17 for grey in range(256)]).quantize(16).save(
+                path, optimize=True, pnginfo=notes
+            )
+        before = Image.open(path)
+        tolerated = MOVED if before.info["matplotlib"] == VERSION else MOVED_BY_ANOTHER_VERSION
+        assert moved(before, drawn) < tolerated, (name, moved(before, drawn))
+    files = sorted((GOLDEN / "layouts").glob("*.png"))
+    assert [path.stem for path in files] == sorted(name.replace(" ", "_") for name in figures)
+    assert all(path.stat().st_size <= 20_000 for path in files)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["ride", "ladder", "curves"])
+def test_a_text_that_moved_or_is_missing_is_noticed(name: str, figures: dict[str, Figure]) -> None:
+    figure, path = figures[name], GOLDEN / "layouts" / f"{name.replace(' ', '_')}.png"
+    legend = next(iter([*figure.legends, *[one for axes in figure.axes if (one := axes.get_legend())]]))
+    titles = [text for text in texts(figure) if len(text.get_text()) > 15 and text.axes is not None]
+    title = max(titles, key=lambda text: text.get_fontsize())
+    for artist in (legend, title):
+        artist.set_visible(False)
+        assert moved(Image.open(path), layout(name, figure)) > MOVED
+        artist.set_visible(True)

@@ -59,8 +59,9 @@ def test_a_page_on_fits(comparison: Comparison, tmp_path: Path) -> None:
         "damper_sheet.png",
         "force_velocity.png",
         "ladder.png",
+        "loops_by_law.png",
     ]
-    assert page.count("data:image/png") == 5 and "could not be made" not in page
+    assert page.count("data:image/png") == 6 and "could not be made" not in page
     for table in (comparison.table(), comparison["linear"].table(title="Parameters of linear")):
         assert table.to_html(words=True) in page
     body = re.sub("<nav>.*</nav>", "", page.partition("<main>")[2])
@@ -126,7 +127,7 @@ def test_a_page_on_one_ride_or_several(rides: dict[str, Response], tmp_path: Pat
     page = ride_report(rides, title="A bump", laws={"soft": Linear(1500.0)}, folder=tmp_path).to_html()
     files = ["damper.png", "ride.png", "ride_sheet.pdf", "ride_sheet.png"]
     assert sorted(path.name for path in tmp_path.iterdir()) == files
-    assert "<h1>A bump</h1>" in page and "<p>soft: Linear(rate=1500.0)</p>" in page
+    assert "<h1>A bump</h1>" in page and "<p>soft: linear, rate 1500 N s/m.</p>" in page
     assert "Use of the dampers beside the records of their laws" in page and "<li>firm: damper: velocity" in page
     assert "change [%]" in page
     alone = ride_report(rides["soft"]).to_html()

@@ -1,0 +1,81 @@
+"""Critical damping of the dampers of a vehicle: of the body above them, and of the wheel below."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from jaxdamp._field_types import check_module
+from jaxdamp._limits import root
+from jaxdamp._types import Scalar
+from jaxdamp.vehicles.base import AbstractVehicle
+from jaxdamp.vehicles.frame import STANDARD_GRAVITY, Frame
+from jaxdamp.vehicles.parts import Link, prefixed
+from jaxdamp.vehicles.port_form import Ports
+
+
+class CriticalDamping(NamedTuple):
+    """The rate of one damper at which a motion no longer oscillates; its rate divided by that is the damping ratio.
+
+    Attributes:
+        body: 2 √(k m) [N s/m], with the spring k below the body and the mass m of the body that rests on it.
+        wheel: 2 √((k + k_t) m_w) [N s/m], of the wheel m_w between this spring and its tyre k_t.
+    """
+
+    body: Scalar
+    wheel: Scalar
+
+
+def critical_damping(vehicle: AbstractVehicle) -> dict[str, CriticalDamping]:
+    """Critical damping of body and wheel for each damper between them, by its name.
+
+    Body and wheel are taken for themselves, as single masses: the body with the mass that the wheel carries at rest,
+    W/g − m_w for the static load W of the wheel; the wheel with the body at rest. Springs include laws that act by the
+    stroke, at rest, and are those at the wheel, as is the rate of the damper: with a `MotionRatio` that of the whole
+    law. `modes` has the damping ratios of the coupled motions. Differentiable in every parameter.
+
+    Dampers that are not the only link between a body and a wheel (of a solid axle, a cab, a seat) are left out.
+
+    Arguments:
+        vehicle: any vehicle; a controller is ignored.
+
+    >>> from jaxdamp.vehicles.presets import quarter_car_000
+    >>> critical = critical_damping(quarter_car_000())["damper"]
+    >>> round(float(critical.body)), round(float(critical.wheel))  # 2 √(60e3 · 1200), 2 √(280e3 · 125)
+    (16971, 11832)
+    """
+    check_module("vehicle", vehicle, (AbstractVehicle,), "critical_damping(vehicle)")
+    frame = vehicle.frame()
+    loads, springs = frame.static_wheel_loads(), _springs(frame)
+    on_road = [{name for name in wheel.point.terms if name[:2] == "z_"} for wheel in frame.wheels]
+    lower = [_lower_end(link, set().union(*on_road)) for link in frame.links]
+    pairs = {}
+    for link, end, spring in zip(frame.links, lower, springs, strict=True):
+        wheels = [i for i, heights in enumerate(on_road) if end in heights]
+        if not wheels or lower.count(end) > 1:
+            continue
+        mass = frame.body(end.removeprefix("z_")).mass
+        carried = sum(loads[i] for i in wheels) / STANDARD_GRAVITY - mass
+        stiffness = spring + sum(frame.wheels[i].stiffness for i in wheels)
+        sizes = 2.0 * root(spring * carried), 2.0 * root(stiffness * mass)
+        for element in link.elements:
+            name = prefixed(link.name, element.name)
+            pairs[name] = CriticalDamping(*(size / element.count for size in sizes))
+    return pairs
+
+
+def _springs(frame: Frame) -> list[Scalar]:
+    """The stiffness of each link, with that of its laws at rest [N/m]."""
+    laws = [element.together for part in (*frame.links, *frame.wheels) for element in part.elements]
+    slopes = jnp.zeros(len(laws))
+    if any(law.traits().stroke_dependent_at_rest for law in laws):
+        slopes, _ = Ports(laws).stiffness_and_damping(slopes)
+    ends = np.cumsum([0, *(len(link.elements) for link in frame.links)])
+    return [link.stiffness + jnp.sum(slopes[ends[i] : ends[i + 1]]) for i, link in enumerate(frame.links)]
+
+
+def _lower_end(link: Link, on_road: set[str]) -> str:
+    """The height of the body at the lower end of a link from a body without wheels; empty of other links."""
+    shares = {name: float(share) for name, share in link.extension.terms.items() if name[:2] == "z_"}
+    above, below = ([name for name, share in shares.items() if share * side > 0.0] for side in (1.0, -1.0))
+    return below[0] if len(above) == len(below) == 1 and above[0] not in on_road else ""

@@ -1,0 +1,43 @@
+"""Critical damping: against the damping ratio of a mass alone, and loads by hand."""
+
+import jax
+import numpy as np
+import pytest
+
+from jaxdamp import dampers
+from jaxdamp.vehicles import QuarterCar, critical_damping, modes
+from jaxdamp.vehicles.presets import full_car_jazar, half_car_002, m113_003, truck_001
+
+
+LAW = dampers.Linear(900.0)
+
+
+def test_it_is_that_of_the_modes_where_one_mass_moves_alone():
+    on_stiff_tyre = QuarterCar(300.0, 1e-3, 18e3, 1e10, LAW)
+    body = critical_damping(on_stiff_tyre)["damper"].body
+    assert 900.0 / float(body) == pytest.approx(modes(on_stiff_tyre).damping_ratio[0], rel=1e-4)
+    below_heavy_body = QuarterCar(1e9, 40.0, 18e3, 200e3, LAW)
+    wheel = critical_damping(below_heavy_body)["damper"].wheel
+    assert 900.0 / float(wheel) == pytest.approx(modes(below_heavy_body).damping_ratio[-1], rel=1e-4)
+
+
+def test_a_spring_among_the_laws_counts():
+    law = LAW + dampers.Spring(6e3)
+    pairs = [critical_damping(QuarterCar(300.0, 40.0, k, 2e5, d)) for k, d in ((18e3, LAW), (12e3, law))]
+    np.testing.assert_allclose(*(np.array(pair["damper"]) for pair in pairs), rtol=1e-12)
+
+
+def test_each_wheel_carries_its_share():
+    front, rear = (critical_damping(half_car_002())[f"{end}_damper"] for end in ("front", "rear"))
+    np.testing.assert_allclose(front.body, 2.0 * np.sqrt(23.5e3 * 580.0 * 1.5 / 2.5), rtol=1e-9)
+    np.testing.assert_allclose(rear.body, 2.0 * np.sqrt(23.5e3 * 580.0 * 1.0 / 2.5), rtol=1e-9)
+    assert set(critical_damping(full_car_jazar())) == {
+        f"{end}_{side}_damper" for end in ("front", "rear") for side in ("left", "right")
+    }
+    assert set(critical_damping(truck_001())) == {"front_damper", "tandem_damper"}
+    assert critical_damping(m113_003()) == {}  # its wheels have no mass
+
+
+def test_it_is_differentiable():
+    slope = jax.jit(jax.grad(lambda k: critical_damping(QuarterCar(300.0, 40.0, k, 2e5, LAW))["damper"].body))(18e3)
+    assert float(slope) == pytest.approx(np.sqrt(300.0 / 18e3), rel=1e-9)
