@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
@@ -268,9 +268,9 @@ def _points(some: Chosen, points: AbstractPoints, about: Callable[[str], dict[st
     import xarray
 
     axes = points.columns(some.index) if some.index.size else dict.fromkeys(points.names, np.zeros(0))
-    coordinates: dict[str, Any] = {name: (POINT, values, about(name)) for name, values in axes.items()}
-    coordinates["index"] = (POINT, some.index)
-    return xarray.Dataset({name: (POINT, v, about(name)) for name, v in some.values.items()}, coordinates)
+    coordinates = {name: (POINT, values, about(name)) for name, values in axes.items()}
+    data = xarray.Dataset({name: (POINT, v, about(name)) for name, v in some.values.items()}, coordinates)
+    return data.assign_coords(index=(POINT, some.index))
 
 
 def _said(kept: Kept) -> str:
