@@ -55,7 +55,7 @@ def records_table(runs: Sequence[BenchRun], held_out: Sequence[BenchRun] = ()) -
     for run in runs:
         row: tuple[Cell, ...] = (run.name, run.sampling_rate, run.frequency, 1e3 * run.amplitude, run.peak_velocity)
         row += (float(run.force.min()), float(run.force.max()), run.work_per_cycle, run.cycles)
-        rows.append(row + ("held\N{NO-BREAK SPACE}out" if run.name in names else "fitted",) * bool(held_out))
+        rows.append(row + ("held out" if run.name in names else "fitted",) * bool(held_out))
     return Table("Records (stroke and velocity positive in rebound)", tuple(columns), tuple(rows))
 
 

@@ -88,7 +88,14 @@ def test_fit_writes_tables_pictures_and_a_report(records: Path, tmp_path: Path) 
     assert json.loads((out / "manifest.json").read_text())["files"] == [f for f in files if f != "manifest.json"] + [
         "manifest.json"
     ]
-    pictures = ["best_law_held_out.png", "best_law_loops.png", "damper_sheet.png", "force_velocity.png", "ladder.png"]
+    pictures = [
+        "best_law_held_out.png",
+        "best_law_loops.png",
+        "damper_sheet.png",
+        "force_velocity.png",
+        "ladder.png",
+        "loops_by_law.png",
+    ]
     assert [file for file in files if file.endswith(".png")] == pictures
     assert all((out / name).read_bytes().startswith(b"\x89PNG") for name in pictures)
     ladder = _rows(out / "tables" / "ladder.csv")

@@ -46,7 +46,7 @@ def test_without_a_speed_positions_are_times(tmp_path):
     ("content", "options", "message"),
     [
         ("# nothing\n", {}, r"`path` must name a file with numbers.*empty"),
-        ("x,z\n", {}, r"`position` must hold at least two samples"),
+        ("x,z\n", {}, r"`path` must name a file with numbers, but is .*road.csv, which has only 'x,z'"),
         ("0,1\n1,2,3\n", {}, r"`path` must name a file with 2 numbers in each line.*'1,2,3'"),
         ("x;z\n0;1\n1;2,5\n", {}, r"`path` must name a file with 2 numbers.*'1;2,5'.*decimals have a point"),
         ("x,z\n0,1\n1,2\n", {"height": "zz"}, r"`height` must be one of 'x', 'z', but is 'zz'. Did you mean 'z'"),
