@@ -104,7 +104,7 @@ def test_fit_writes_tables_pictures_and_a_report(records: Path, tmp_path: Path) 
     assert [row["use"] for row in _rows(out / "tables" / "records.csv")] == ["fitted", "fitted", "held out"]
     assert float(_rows(out / "tables" / "parameters_bilinear.csv")[0]["value"]) == pytest.approx(2600.0, rel=2e-3)
     report = (out / "report.html").read_text(encoding="utf-8")
-    assert report.count("data:image/png;base64,") == 5 and "held-out RMSE [N]" in report
+    assert report.count("data:image/png;base64,") == 6 and "held-out RMSE [N]" in report
     assert "Baseline on the same records: RMSE " in report and f"<pre>jaxdamp fit {records} --law linear" in report
 
 
