@@ -1,3 +1,4 @@
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOptionalMemberAccess=false, reportAttributeAccessIssue=false
 """Records at several gas pressures as one law: valves in common, the gas by the pressure that the records state."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOptionalMemberAccess=false, reportAttributeAccessIssue=false
 """Records that begin at other temperatures: prediction of a new one, stated starts, and whether heat helps."""
 
 import dataclasses

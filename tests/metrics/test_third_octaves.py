@@ -1,3 +1,4 @@
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOptionalMemberAccess=false, reportAttributeAccessIssue=false
 """Third octaves: bands of white noise by hand, and the weighted RMS of the whole."""
 
 import numpy as np
