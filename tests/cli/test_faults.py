@@ -1,3 +1,4 @@
+# pyright: reportArgumentType=false, reportOperatorIssue=false, reportOptionalOperand=false
 """What can happen to a command from outside: signals at any moment, a full disk, folders from which nothing runs."""
 
 import json

@@ -1,3 +1,4 @@
+# pyright: reportArgumentType=false, reportOperatorIssue=false, reportOptionalOperand=false
 """The recommended law: judged on motion held out, as simple as it may be, and believable."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# pyright: reportArgumentType=false, reportOperatorIssue=false, reportOptionalOperand=false
 """Fits of a law together with the machine that its records come from."""
 
 from dataclasses import replace
