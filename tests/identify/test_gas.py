@@ -1,4 +1,3 @@
-# pyright: reportArgumentType=false, reportCallIssue=false, reportOptionalMemberAccess=false, reportAttributeAccessIssue=false
 """Records at several gas pressures as one law: valves in common, the gas by the pressure that the records state."""
 
 import dataclasses
@@ -9,7 +8,7 @@ import pytest
 
 from jaxdamp import respond
 from jaxdamp.bench import BenchRun, SineTest, VirtualDyno
-from jaxdamp.dampers import CoulombFriction, GasSpring, MonoTube, PiecewiseLinear, Spring, with_command
+from jaxdamp.dampers import CoulombFriction, GasSpring, MonoTube, PiecewiseLinear, Scheduled, Spring, with_command
 from jaxdamp.identify import fit, fit_scheduled
 from jaxdamp.parameters import get, replace
 from jaxdamp.rig import Rig
@@ -93,7 +92,9 @@ def test_a_number_that_the_pressure_changes_has_a_value_for_each():
     assert [float(get(level, "terms.1.pressure")) for level in law.laws] == list(PRESSURES)
     found = [float(get(level, "terms.2.friction_force")) for level in law.laws]
     np.testing.assert_allclose(found, frictions, atol=2.0)
-    np.testing.assert_allclose(get(with_command(law, 2.7e6).at_command(), "terms.1.pressure"), 2.7e6)
+    between = with_command(law, 2.7e6)
+    assert isinstance(between, Scheduled)
+    np.testing.assert_allclose(get(between.at_command(), "terms.1.pressure"), 2.7e6)
     (left,) = by_pressure.between
     assert left.setting == 2e6 and left.rmse < 1.2 * NOISE
 

@@ -1,4 +1,3 @@
-# pyright: reportArgumentType=false, reportOperatorIssue=false, reportOptionalOperand=false
 """The recommended law: judged on motion held out, as simple as it may be, and believable."""
 
 import dataclasses
@@ -62,8 +61,9 @@ def test_velocities_that_one_record_alone_reaches_count_too():
     runs = list(VirtualDyno(truth, sampling_rate=400.0, force_noise=20.0).run(tests))
     comparison = compare(identify.default_ladder(runs, ["polynomial", "series_spring_dahl"]), runs)
     assert comparison.best.name.startswith("series_spring_dahl")
-    assert comparison.best.held_out_fit_percent > 94.0  # in the slow motion, which is noise, 31 % and not told apart
-    assert next(rung for rung in comparison.rungs if rung.name == "polynomial").held_out_fit_percent < 80.0
+    percent = {rung.name: rung.held_out_fit_percent or 0.0 for rung in comparison.rungs}
+    assert percent[comparison.best.name] > 94.0  # in the slow motion, which is noise, 31 %, and 29 % of the other
+    assert 0.0 < percent["polynomial"] < 80.0
 
 
 def test_a_single_record_is_judged_quarter_by_quarter(sines):

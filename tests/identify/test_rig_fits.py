@@ -1,4 +1,3 @@
-# pyright: reportArgumentType=false, reportOperatorIssue=false, reportOptionalOperand=false
 """Fits of a law together with the machine that its records come from."""
 
 from dataclasses import replace
@@ -269,11 +268,12 @@ def test_a_whole_path_of_the_law_is_the_same_number_beside_a_machine() -> None:
     many = identify.fit_many(alone, {"a": runs, "b": runs}, rig="offset", freeze=["lag_time", "*_rate"], max_steps=1)
     assert many.free.names == with_machine.free.names
     both = r"'law\.lag_time'.* It is law\.law\.lag_time of the law, but law\.lag_time beside a machine"
-    for argument in (
+    arguments: tuple[dict[str, Any], ...] = (
         {"freeze": ["law.lag_time"]},
         {"bounds": {"law.lag_time": (1e-3, 1e-2)}},
         {"over": ["law.lag_time"]},
-    ):
+    )
+    for argument in arguments:
         assert identify.prepare(alone, runs, **argument)
         with pytest.raises(ValueError, match=both + r".*Write 'lag_time' or 'law\.law\.lag_time'"):
             identify.prepare(alone, runs, rig="offset", **argument)
