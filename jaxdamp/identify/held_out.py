@@ -70,14 +70,14 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
     groups = motions(runs)
     whole = not in_time and _as_wholes(result, problem, groups)
     samples: list[Compared] = []
-    unreached = [np.ones(len(run), bool) for run in runs]
+    unreached = [np.zeros(len(run), bool) for run in runs]
     left_out = _by_record(runs, groups) if whole else zip(*map(in_time_parts, runs), strict=True)
     for number, part in enumerate(left_out, 1):
         factor = _kept(problem, fitted, part)
         if np.all(factor) or not np.any(problem.used & (factor > 0)):
             continue
         near = _reached(runs, part)
-        unreached = [at & ~reached for at, reached in zip(unreached, near, strict=True)]
+        unreached = [at | (left & ~reached) for at, left, reached in zip(unreached, part, near, strict=True)]
         names = [run.name if whole else f"{run.name}, part {number} of {PARTS}" for run in runs]
         parts = zip(map(int, fitted), names, near, strict=True)
         models, told = _predicting(_refitted(start, factor), fitted, part, result)

@@ -89,8 +89,8 @@ def prepare(
     runs = _records(runs)
     sigma = weights(weighting, runs)
     fitted_to = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
-    stated = [*name_patterns("per_record", per_record), *(bounds or ()), *(priors or ()), *(tie or {})]
-    begin, machine, held = started_on(law, fitted_to, rig, stated)
+    mentioned = [*name_patterns("per_record", per_record), *(bounds or ()), *(priors or ()), *(tie or {})]
+    begin, machine, held = started_on(law, fitted_to, rig, mentioned)
     model, absent = on_rig(begin, machine), [*absent_paths(machine), *held]
     initial_state = initial_state_for(model, initial_state)
     expected: tuple[Priors, ...] = ()

@@ -12,6 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxdamp import _checks
 from jaxdamp.control import laws_at_levels
 from jaxdamp.dampers import AbstractDamper, Linear, takes_command, without_fitted_ranges
 from jaxdamp.parameters import get
@@ -62,9 +63,12 @@ class Rides:
 
     @classmethod
     def of_responses(cls, rides: Mapping[str, Response], limits: Mapping[str, object] | None) -> "Rides":
-        """Rides on one road, the first against the last."""
+        """Rides on one road, which is not level, the first against the last."""
         first, last = next(iter(rides)), list(rides)[-1]
         pair = (rides[first], rides[last])
+        if level := [name for name in (first, last) if not np.any(np.asarray(rides[name].road_rate))]:
+            remedy = "`plots.ride` draws a motion without a road."
+            _checks.refuse("rides", "be driven over a road that is not level all the time", level[0] or "a ride", remedy)
         sides = tuple({name: float(v) for name, v in each.metrics().items()} for each in pair)
         time = np.asarray(pair[0].time)
         dt = float(f"{(time[-1] - time[0]) / (len(time) - 1):.6g}")  # single precision has no more digits

@@ -27,7 +27,7 @@ def test_a_law_that_cannot_be_started_or_fitted_is_named_and_the_others_are_comp
     assert "polynomial could not be fitted." in text
     assert sorted(path.stem for path in (out / "laws").iterdir()) == ["bilinear", "linear"]
     report = (out / "report.html").read_text(encoding="utf-8")
-    assert "table could not be fitted" in report and report.count("data:image/png") == 4
+    assert "table could not be fitted" in report and report.count("data:image/png") == 5
     rows = (out / "tables" / "ladder.csv").read_text(encoding="utf-8").splitlines()
     assert [row.split(",")[0] for row in rows[1:]] == ["linear", "bilinear", "table", "polynomial"]
     assert rows[3].endswith(",failed")

@@ -1,5 +1,6 @@
 """What sheets and sweeps show in numbers: gains, damping ratios, velocities of each damper, the present design."""
 
+import equinox as eqx
 import numpy as np
 import pytest
 import xarray
@@ -38,6 +39,13 @@ def test_each_damper_of_a_full_car_has_its_own_velocity() -> None:
     assert names == ["front_left_damper", "rear_left_damper"]
     for path, name in zip(paths, names, strict=True):
         np.testing.assert_array_equal(_rides.damper_velocity(shown, path, 0), ride[f"{name}_velocity"])
+
+
+def test_a_sheet_of_a_level_road_is_refused(responses: dict[str, Response]) -> None:
+    soft = responses["soft"]
+    still = eqx.tree_at(lambda response: response.road_rate, soft, np.zeros_like(soft.road_rate))
+    with pytest.raises(ValueError, match="`rides` must be driven over a road that is not level .* but is still"):
+        plots.ride_sheet({"soft": soft, "still": still})
 
 
 def test_the_damping_ratio_is_the_secant_rate_over_critical_damping() -> None:
