@@ -68,7 +68,9 @@ class Rides:
         pair = (rides[first], rides[last])
         if level := [name for name in (first, last) if not np.any(np.asarray(rides[name].road_rate))]:
             remedy = "`plots.ride` draws a motion without a road."
-            _checks.refuse("rides", "be driven over a road that is not level all the time", level[0] or "a ride", remedy)
+            _checks.refuse(
+                "rides", "be driven over a road that is not level all the time", level[0] or "a ride", remedy
+            )
         sides = tuple({name: float(v) for name, v in each.metrics().items()} for each in pair)
         time = np.asarray(pair[0].time)
         dt = float(f"{(time[-1] - time[0]) / (len(time) - 1):.6g}")  # single precision has no more digits

@@ -44,7 +44,7 @@ def test_each_damper_of_a_full_car_has_its_own_velocity() -> None:
 def test_a_sheet_of_a_level_road_is_refused(responses: dict[str, Response]) -> None:
     soft = responses["soft"]
     still = eqx.tree_at(lambda response: response.road_rate, soft, np.zeros_like(soft.road_rate))
-    with pytest.raises(ValueError, match="`rides` must be driven over a road that is not level .* but is still"):
+    with pytest.raises(ValueError, match=r"`rides` must be driven over a road that is not level .* but is still"):
         plots.ride_sheet({"soft": soft, "still": still})
 
 
