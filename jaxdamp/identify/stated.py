@@ -78,8 +78,8 @@ def _of_records(name: str, parameter: Parameter, runs: Sequence[BenchRun]) -> li
         factor = (ratio(unit, parameter.unit) if unit else None) if parameter.unit else float(not unit)
         if number is None or not factor:
             given, must = repr(run.settings[name]), f"state {name} of {run.name!r} in a unit of it"
-            remedy = f'Write it like `settings={{"{name}": "2 {parameter.unit}"}}`, or name the setting otherwise: it is'
-            remedy += " a parameter of the law."
+            remedy = f'Write it like `settings={{"{name}": "2 {parameter.unit}"}}`, or name the setting otherwise:'
+            remedy += " it is a parameter of the law."
             _checks.refuse("settings", must, given, remedy)
         values.append(number * factor)
     if not parameter.domain.contains(np.array(values)):
