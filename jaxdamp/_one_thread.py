@@ -22,10 +22,20 @@ def _controller() -> Any:
     return ThreadpoolController()
 
 
+def _any_thread_may_set() -> None:
+    """From threadpoolctl 3.8 on only the first thread that set a limit can set others, as long as it lives."""
+    from threadpoolctl import OpenBLASController
+
+    if clear := getattr(OpenBLASController, "clear_controlling_thread", None):
+        clear(force=True)
+
+
 @contextmanager
 def one_thread() -> Iterator[None]:
     """Limit the linear algebra of the process to one thread; fits in several threads share one limit."""
     with _lock:
+        if not _open:
+            _any_thread_may_set()
         _open.append(_controller().limit(limits=1, user_api="blas") if not _open else None)
     try:
         yield
@@ -33,4 +43,5 @@ def one_thread() -> Iterator[None]:
         with _lock:
             limit = _open.pop()
             if limit is not None:
+                _any_thread_may_set()
                 limit.restore_original_limits()

@@ -1,5 +1,7 @@
 """The linear algebra of a fit runs in one thread, and the limit is lifted afterwards, whatever the order."""
 
+import threading
+
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -35,6 +37,25 @@ def test_it_is_lifted_after_an_error() -> None:
     with pytest.raises(RuntimeError), one_thread():
         raise RuntimeError
     assert threads() == {2}
+
+
+def test_it_holds_whichever_thread_asks_for_it() -> None:
+    """A fit in the main thread, then fits in threads of a pool."""
+    with one_thread():
+        assert threads() == {1}
+    seen: list[set[int]] = []
+
+    def in_thread() -> None:
+        with one_thread():
+            seen.append(threads())
+
+    for _ in range(2):
+        worker = threading.Thread(target=in_thread)
+        worker.start()
+        worker.join()
+    with one_thread():
+        seen.append(threads())
+    assert seen == [{1}] * 3 and threads() == {2}
 
 
 def test_velocities_of_records_are_found_in_one(monkeypatch: pytest.MonkeyPatch) -> None:
