@@ -23,6 +23,7 @@ _SEGMENT = 4.0  # s
 _EXCITED = 1e-3  # share of the largest density of the road's rate from which a response follows from it
 _DEEPEST = 3e-3  # share of the largest gain that is shown
 _LETTERS = 30  # in a line of a legend
+_LINE = 0.1  # height of this line, as a share of the panel
 _MM = 1e3
 
 
@@ -124,7 +125,7 @@ def comfort(axes: Axes, shown: _rides.Rides) -> None:
         sides.append((words, style, spectra[number]))
     third_octaves(axes, sides, weighting, unit, _style.metric_words(channel))
     lines = sum(label.count("\n") + 1 for label, *_ in sides)
-    axes.set_ylim(0.0, (1.15 + 0.15 * lines) * axes.get_ylim()[1])
+    axes.set_ylim(0.0, axes.get_ylim()[1] / max(0.95 - _LINE * lines, 0.3))
     axes.legend(frameon=False, loc="upper left")
 
 

@@ -54,7 +54,7 @@ def ride_sheet(
         first = [figure.add_subplot(at) for at in rows[1].subgridspec(1, 2, width_ratios=(1.0, 1.15))]
         _ride_panels.vehicle(first[0], shown)
         _ride_panels.road(first[1], shown)
-        second = [figure.add_subplot(at) for at in rows[2].subgridspec(1, 2)]
+        second = [figure.add_subplot(at) for at in rows[2].subgridspec(1, 2, wspace=0.06)]
         _ride_panels.plane(second[0], shown)
         _ride_panels.bars(second[1], shown)
         paths = shown.dampers()

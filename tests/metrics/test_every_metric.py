@@ -94,6 +94,7 @@ OTHERS = {
     "weighting_response",
     "weighting_state_space",
     "discrete_weighting",
+    "third_octave_rms",
 }
 COUNTS = {"lift_off_fraction", "working_space_exceedance"}
 DIFFERENTIABLE = [name for name in METRICS if name not in COUNTS]
