@@ -113,6 +113,10 @@ ANSWERS = {  # call: words that its refusal holds
     "Ride(car, road, metrics=metrics.Metric('stroke', 'rms'))": ("`metrics` must be a list", "`metrics=[metric]`"),
     "tune.minimise('rms_sprung_acceleration', road, car)": ("`vehicle` must be a vehicle", "is an Iso8608"),
     "sweep({'damper.rate': [1.0]}, lambda point: point)": ("`function` must be a function", "`sweep(function, over)`"),
+    "sweep(lambda p: {'y': p['a']}, {'a': [1.0]}, summary={'y': 3})": (
+        "`summary` must say what is kept",
+        "sweeps.Summary",
+    ),
     "bench.VirtualDyno(1500.0)": ("`law` must be a damper law", "dampers.Linear(1500.0)"),
     "bench.VirtualDyno(law, rig=law)": ("`rig` must be a Rig", "is a Linear", "VirtualDyno(law, rig=Rig("),
     "bench.VirtualDyno(law, sensors=5.0)": ("`sensors` must be sensors", "bench.Sensors(force_noise=5.0)"),

@@ -129,7 +129,6 @@ def test_a_front_of_many_points_is_that_of_all_pairs():
         (Summary(smallest={"pair": 1}), r"`summary\.smallest` must be one of"),
         (Summary(largest={"y": 0}), r"summary\.largest\['y'\]"),
         (Summary(pareto=["y"]), "two or more different results, but is y"),
-        ({"y": 3}, r"Write `summary=sweeps\.Summary\(\.\.\.\)`"),
     ],
 )
 def test_what_cannot_be_kept_is_refused(keep, message):
