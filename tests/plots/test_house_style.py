@@ -256,6 +256,7 @@ def layout(name: str, figure: Figure) -> Image.Image:
     small = []
     for share in (1.0,) if is_page(name) else (1.0, *WIDTHS):
         with at_width(figure, share) as resized, io.BytesIO() as written:
+            resized.draw_without_rendering()  # a label that just fits wraps or not by how the figure was drawn before
             resized.savefig(written, dpi=50)
             whole = Image.open(written).convert("L")
             size = (SMALL, round(SMALL * whole.height / whole.width / CELL) * CELL)
