@@ -104,9 +104,14 @@ def concrete(value: object) -> np.ndarray | None:
 
 
 def _numbers(argument: str, value: object) -> np.ndarray | None:
-    """The value, also behind derivatives and batches; None inside `jax.jit`. What is no real number is refused."""
+    """The value, also behind derivatives and batches; None inside `jax.jit`. What is no real number is refused.
+
+    So is a process where JAX would hang: what checks its numbers here goes on to compute with them.
+    """
+    from jaxdamp._forked import refuse_fork
     from jaxdamp._traced import behind
 
+    refuse_fork()
     array = behind(value)
     if array is not None and array.dtype.kind not in "biuf":
         refuse(argument, "be a real number" if array.dtype.kind == "c" else "be a number", described(value))

@@ -10,6 +10,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxdamp import _checks
+from jaxdamp._forked import refuse_fork
 from jaxdamp._types import Number, Vector
 
 
@@ -58,6 +59,7 @@ def check_module(argument: str, value: object, kinds: tuple[type, ...], call: st
         kinds: classes of modules.
         call: how the function is called, such as `"simulate(vehicle, road)"`, for arguments in the wrong order.
     """
+    refuse_fork()
     if isinstance(value, kinds):
         return
     wanted = [kind for kind in kinds if kind is not types.NoneType]

@@ -14,6 +14,7 @@ from jax.extend.random import threefry_2x32
 from jaxtyping import Array, Float, UInt32
 
 from jaxdamp import _checks
+from jaxdamp._forked import refuse_fork
 
 
 _MASK = 0xFFFFFFFF
@@ -100,6 +101,7 @@ def _halves(words: UInt32[Array, "2"], shape: tuple[int, ...]) -> tuple[UInt32[A
 
 def _words(seed: int | Array) -> UInt32[Array, "2"]:
     """The two words of the key of `jax.random.key(seed)`, or of a key, also one of the old kind (two words)."""
+    refuse_fork()
     if isinstance(seed, jax.Array):
         if jnp.issubdtype(seed.dtype, jax.dtypes.prng_key):
             words = jax.random.key_data(seed)

@@ -1,6 +1,7 @@
 """A process that was forked while JAX was at work is told so, instead of waiting for ever."""
 
 import os
+import signal
 import subprocess
 import sys
 import warnings
@@ -8,8 +9,8 @@ import warnings
 import numpy as np
 import pytest
 
-from jaxdamp import Ride, identify, respond, roads, simulate, sweep, vehicles
-from jaxdamp.dampers import Linear
+from jaxdamp import Ride, bench, identify, metrics, respond, roads, simulate, sweep, vehicles
+from jaxdamp.dampers import Linear, Table
 
 
 LAW, TIME = Linear(1500.0), np.linspace(0.0, 1.0, 11)
@@ -21,22 +22,46 @@ CALLS = {
     "ride": RIDE,
     "sweep": lambda: sweep(RIDE, {"sprung_mass": [300.0, 400.0]}),
     "fit": lambda: identify.fit(Linear, []),
+    "a law": lambda: Table([-1.0, 0.0, 1.0], [-900.0, 0.0, 1500.0]),
+    "a vehicle": vehicles.presets.half_car_002,
+    "a road of a formula": lambda: roads.sine(0.01, wavelength=5.0, speed=20.0),
+    "a road from a profile": lambda: roads.from_profile(TIME, TIME, speed=20.0),
+    "a random road": lambda: roads.iso8608("C", speed=20.0, seed=1),
+    "heights": lambda: ROAD.height(TIME),
+    "modes": lambda: vehicles.modes(CAR),
+    "frequency response": lambda: vehicles.frequency_response(CAR, [1.0]),
+    "spectral rms": lambda: vehicles.spectral_rms(CAR, [1.0, 2.0], [1.0, 1.0]),
+    "metric": lambda: metrics.rms(TIME),
+    "metric of a run": lambda: metrics.weighted_rms(TIME, 1e-3, "Wk"),
+    "virtual dyno": lambda: bench.VirtualDyno(LAW).run([bench.SineTest(0.02, 1.0)]),
 }
 
 
-@pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
-def test_a_computation_in_a_forked_process_is_refused(call):
+def _in_a_forked_process(call):
+    """The exit code: 0 where it was refused with the remedy, 2 where the call went through, below 0 where it hung."""
     respond(LAW, TIME, 0.0 * TIME)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of JAX and Python, which do not say what to do
         child = os.fork()
     if not child:
+        signal.alarm(30)
         try:
             call()
         except RuntimeError as error:
             os._exit(0 if 'get_context("spawn")' in str(error) else 1)
         os._exit(2)
-    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+@pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
+def test_a_computation_in_a_forked_process_is_refused(call):
+    assert _in_a_forked_process(call) == 0
+
+
+def test_records_are_read_in_a_forked_process(tmp_path):
+    run = bench.BenchRun.from_arrays("run", np.arange(200) / 100, np.sin(np.arange(200) / 10), np.arange(200.0))
+    bench.BenchSet([run]).write(tmp_path)
+    assert _in_a_forked_process(lambda: bench.read(tmp_path, sign="rebound-positive")) == 2
 
 
 @pytest.mark.slow

@@ -5,11 +5,13 @@ from jax.typing import ArrayLike
 from jaxtyping import Array
 
 from jaxdamp import _checks
+from jaxdamp._forked import refuse_fork
 from jaxdamp._types import ScalarLike, Signal, SignalLike
 
 
 def as_signal(argument: str, signal: SignalLike, *, least: int = 1) -> Signal:
     """The signal as a JAX array of floats, refused unless it has one axis and `least` samples."""
+    refuse_fork()
     array = jnp.asarray(signal)
     if not jnp.issubdtype(array.dtype, jnp.inexact):
         array = array.astype(float)
@@ -23,6 +25,7 @@ def as_signal(argument: str, signal: SignalLike, *, least: int = 1) -> Signal:
 
 def as_numbers(*values: ArrayLike) -> list[Array]:
     """Numbers or arrays of them as floats of one type, the one that JAX finds for all."""
+    refuse_fork()
     dtype = jnp.result_type(*values)
     dtype = dtype if jnp.issubdtype(dtype, jnp.floating) else jnp.result_type(float)
     return [jnp.asarray(value, dtype) for value in values]

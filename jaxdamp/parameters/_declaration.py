@@ -12,6 +12,7 @@ from jax.core import Tracer
 from jaxtyping import Array
 
 from jaxdamp import _checks
+from jaxdamp._forked import refuse_fork
 from jaxdamp._traced import is_traced
 from jaxdamp.parameters._domains import Domain, real
 
@@ -26,6 +27,7 @@ def as_float(value: object, name: str = "value") -> Array:
     Raises:
         ValueError: something that is not a number; the message names the argument.
     """
+    refuse_fork()
     if isinstance(value, jax.Array) and jnp.issubdtype(value.dtype, jnp.floating):
         return value
     if value is None or isinstance(value, str | bytes | type | eqx.Module):

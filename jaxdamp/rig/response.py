@@ -11,7 +11,6 @@ from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
-from jaxdamp._forked import refuse_fork
 from jaxdamp._types import Signal, SignalLike, State
 from jaxdamp.dampers import (
     AbstractDamper,
@@ -149,7 +148,6 @@ def respond(
     >>> round(float(force[0]), 6)
     120.0
     """
-    refuse_fork()
     check_module("law", law, (AbstractDamper,), "respond(law, time, stroke, velocity)")
     instants, time, stroke = _checks.concrete(time), as_float(time), as_float(stroke)
     _check_record(instants, time, stroke, velocity)

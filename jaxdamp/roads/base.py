@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jax.tree_util import Partial
 from jaxtyping import Array, ArrayLike, Float
 
+from jaxdamp._forked import refuse_fork
 from jaxdamp._types import Scalar, SignalLike
 
 
@@ -71,6 +72,7 @@ class AbstractRoad(eqx.Module):
         Of a single time it is one height for each wheel, for a vector field of your own. `jax.jit(road.height)` and
         the like work.
         """
+        refuse_fork()
         times = jnp.asarray(time, float)
         if times.ndim == 1:
             return self.heights_at(times)

@@ -12,7 +12,6 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_field_types, check_module
-from jaxdamp._forked import refuse_fork
 from jaxdamp._traced import at_compile_time, behind, is_traced
 from jaxdamp._types import Scalar, ScalarLike, Signal
 from jaxdamp.dampers import coverage, warn_outside
@@ -132,7 +131,6 @@ def simulate(
     >>> round(float(response.metrics()["working_space_peak_to_peak"]), 3)
     0.072
     """
-    refuse_fork()
     check_module("vehicle", vehicle, (AbstractVehicle,), "simulate(vehicle, road)")
     check_module("road", road, (AbstractRoad,), "simulate(vehicle, road)")
     refuse_stacked(vehicle)

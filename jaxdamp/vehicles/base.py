@@ -11,6 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._forked import refuse_fork
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.metrics import Metric, current_name
@@ -35,6 +36,7 @@ class AbstractVehicle(AbstractDeclared):
 
     def system(self) -> System:
         """The assembled vehicle: matrices, laws, outputs. Compiled once for all vehicles of one layout."""
+        refuse_fork()
         return _assembled(self)
 
     @property

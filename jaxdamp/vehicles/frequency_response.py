@@ -136,8 +136,8 @@ def spectral_rms(
     >>> round(float(rms["sprung_acceleration"]), 1)
     65.8
     """
-    points, levels = jnp.asarray(frequency, dtype=float), jnp.asarray(density, dtype=float)
     _checks.finite("density", density)
+    points, levels = jnp.asarray(frequency, dtype=float), jnp.asarray(density, dtype=float)
     values = _checks.concrete(frequency)
     if values is not None and (values.ndim != 1 or values.size < 2):
         _checks.refuse("frequency", "have one axis and two values or more", f"of shape {values.shape}")
