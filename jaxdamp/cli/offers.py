@@ -61,8 +61,7 @@ NAMES = {  # of options that differ from the argument, by function or for all; t
     "identify.fit_vehicle start": "initial_motion",
 }
 ALIASES = {"--force": "--replace", "--metrics": "--metric"}  # names of before, which still work
-ALIASES_OF = {"export": {"--out": "--file"}, "explore": {"--out": "--file"}}
-ALIASES_OF |= {command: {"--sign": "--show-sign"} for command in ("ride", "tune", "sweep")}  # which read no records
+ALIASES_OF = {command: {"--sign": "--show-sign"} for command in ("ride", "tune", "sweep")}  # which read no records
 SHORT = {"verbose": "-v"}
 
 

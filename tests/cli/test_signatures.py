@@ -177,7 +177,7 @@ def test_help_needs_no_jax_and_speaks_no_python() -> None:
 def test_names_of_before_and_names_of_python_still_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     to_json(Bilinear(2600.0, 1200.0), tmp_path / "law.json")
-    jaxdamp("export", "law.json", "--to", "csv", "--out", "first.csv")
+    jaxdamp("export", "law.json", "--to", "csv", "--file", "first.csv")
     jaxdamp("export", "law.json", "--to", "csv", "--file=first.csv", "--force")
     assert (tmp_path / "first.csv").is_file()
     call = ("tune", "quarter_car_000", "white:C", "--bounds", "rate=3000:4000", "--out", tmp_path / "out")
