@@ -59,6 +59,7 @@ from jaxdamp.bench.settings import (
     by_number as by_number,
     initial_temperature as initial_temperature,
     number_and_unit as number_and_unit,
+    refuse_misspelt as refuse_misspelt,
     settings_apart as settings_apart,
 )
 from jaxdamp.bench.units import ratio as ratio

@@ -2,7 +2,8 @@
 
 import itertools
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from difflib import get_close_matches
 
 import numpy as np
 
@@ -17,6 +18,7 @@ TEMPERATURE = "temperature"  # the setting that states how warm the damper is wh
 Settings = Mapping[str, float | int | str]
 _FIELD = re.compile(r"\{(\w*)\}")
 _NUMBER = re.compile(r"[+-]?\d+(?:[.,]\d+)?")
+_NEAR = 0.85  # similarity of a name to another one from which it is taken for a misspelling
 _RECUR = 0.3  # share of the pairs of one motion that contradict, from which several settings were recorded
 
 
@@ -72,8 +74,28 @@ def _value(text: str) -> float | str:
     return float(text.replace(",", ".")) if _NUMBER.fullmatch(text) else text
 
 
+def refuse_misspelt(name: str, known: Iterable[str]) -> None:
+    """Refuse a setting whose name is nearly one that has a meaning, which would state nothing.
+
+    Longer names, such as "oil_temperature", and those that are near to nothing are the user's own.
+
+    Arguments:
+        name: of the setting.
+        known: names that have a meaning.
+
+    Raises:
+        ValueError: such a name.
+    """
+    others = {word.lower(): word for word in known if word != name}
+    near = get_close_matches(name.lower(), others, 1, _NEAR)
+    if near and (near[0] == name.lower() or near[0] not in name.lower()):
+        remedy = f"Did you mean {others[near[0]]!r}? If not, name it otherwise: it would be taken for that."
+        _checks.refuse("settings", "have names that are spelt right", repr(name), remedy)
+
+
 def _add(settings: dict, more: Settings, name: str) -> None:
     for key, value in more.items():
+        refuse_misspelt(key, [TEMPERATURE])
         if settings.setdefault(key, value) != value:
             must = f"give each setting one value, as {key} of {name!r}"
             _checks.refuse("settings", must, f"{settings[key]!r} and {value!r}")

@@ -28,7 +28,7 @@ from jaxdamp.identify.many_blocks import fit_into_store
 from jaxdamp.identify.many_judging import judged, physical
 from jaxdamp.identify.many_records import Options, begun_on, by_name, fitted_records, refuse_several_laws
 from jaxdamp.identify.many_result import ManyFits
-from jaxdamp.identify.model import initial_state_for, law_names, rig_of
+from jaxdamp.identify.model import initial_state_for, own_names, rig_of
 from jaxdamp.identify.preparing import weights
 from jaxdamp.identify.several import other_starts
 from jaxdamp.identify.starting import Start
@@ -135,7 +135,7 @@ def fit_many(
     begun, _, model, _, free = begun_on(law, some, how, shared)
     for name, runs in zip(names, records, strict=True):
         refuse_several_laws(name, runs, model, how)
-    named = law_names(model)
+    named = own_names(model)
     priors = named.find_keys("priors", priors)
     degrees = shared if isinstance(shared, Mapping) else dict.fromkeys(name_patterns("shared", shared), 0)
     depends = dependence(free, named.find_keys("shared", degrees), stated, len(names))

@@ -10,7 +10,7 @@ from jaxdamp.bench import BenchRun, DamperRecords, as_runs, usable
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.contradicting import contradicting, refuse_contradicting
 from jaxdamp.identify.machine import absent_paths, started_on
-from jaxdamp.identify.model import Model, law_names, on_rig
+from jaxdamp.identify.model import Model, on_rig, own_names
 from jaxdamp.identify.starting import Start
 from jaxdamp.identify.stated import start_paths, stated_parameters, stated_values
 from jaxdamp.parameters import FreeParameters, free_parameters
@@ -92,7 +92,7 @@ def begun_on(law: Start, runs: Sequence[BenchRun], options: Options, shared: Ite
     model = on_rig(begun, machine)
     stated = stated_values(model, runs)  # temperatures that the records begin with
     held = (*held, *(path for path in start_paths(model) if path in stated))
-    names = law_names(model)
+    names = own_names(model)
     freeze = (*names.find("freeze", options["freeze"]), *absent_paths(machine), *held)
     limits, tied = names.find_keys("bounds", bounds), names.find_keys("tie", tie)
     free = free_parameters(model, freeze=freeze, bounds=limits, tie=tied)

@@ -105,14 +105,15 @@ def on_rig(law: AbstractDamper, rig: Rig | None, records: Sequence[RecordStart |
     return law if rig is None and not records else OnRig(law, rig, tuple(records))
 
 
-class LawNames(NamedTuple):
-    """Names of parameters as they stand for a law alone, found beside a machine, where they begin with "law."."""
+class OwnNames(NamedTuple):
+    """Names of a law or a vehicle, found beside machine or sensors, where they begin with "law." or "vehicle."."""
 
-    alone: list[str]  # the paths of the law
-    beside: list[str]  # those of law and machine
+    alone: list[str]  # the paths of the law or the vehicle
+    beside: list[str]  # those with machine and sensors
+    inside: str = "law."
 
     def find(self, argument: str, names: Iterable[str]) -> list[str]:
-        """The names, with "law." before those that are a whole path of the law.
+        """The names, with "law." or "vehicle." before those that are a whole path of it.
 
         Without it the last part of another path would count too: "stiffness" is that of a `SeriesSpring` alone.
 
@@ -144,26 +145,30 @@ class LawNames(NamedTuple):
         if not self.alone:
             return name
         if name in self.alone and name not in self.beside:
-            return f"law.{name}"
-        short = [f"law.{path}" for path in matching(self.alone, name)]
-        long = [path for path in matching(self.beside, name) if path.startswith("law.")]
+            return f"{self.inside}{name}"
+        short = [f"{self.inside}{path}" for path in matching(self.alone, name)]
+        long = [path for path in matching(self.beside, name) if path.startswith(self.inside)]
         if short and long and short != long:
-            remedy = f"It is {', '.join(short)} of the law, but {', '.join(long)} beside a machine, where all paths of"
-            single = f"Write {long[0].removeprefix('law.')!r} or {short[0]!r}."
-            remedy += f' the law begin with "law.". {"Write the names that you mean." if "*" in name else single}'
+            what, with_what = ("law", "a machine") if self.inside == "law." else ("vehicle", "sensors")
+            remedy = (
+                f"It is {', '.join(short)} of the {what}, but {', '.join(long)} beside {with_what}, where all paths"
+            )
+            single = f"Write {long[0].removeprefix(self.inside)!r} or {short[0]!r}."
+            single = "Write the names that you mean." if "*" in name else single
+            remedy += f' of the {what} begin with "{self.inside}". {single}'
             _checks.refuse(argument, "have names with one meaning", repr(name), remedy)
         return name
 
 
-def law_names(model: Model) -> LawNames:
-    """How names of the law of a model are found in it.
+def own_names(model: Model | VehicleTest) -> OwnNames:
+    """How names of the law or the vehicle of a model are found in it.
 
     Arguments:
-        model: a law, alone or on a machine.
+        model: a law, alone or on a machine, or a vehicle with its sensors.
     """
-    law = law_of(model)
-    known = [] if law is model else [[p.path for p in parameters(tree)] for tree in (law, model)]
-    return LawNames(*known or ([], []))
+    part = fitted_part(model)
+    known = [] if part is model else [[p.path for p in parameters(tree)] for tree in (part, model)]
+    return OwnNames(*known or ([], []), "vehicle." if isinstance(model, VehicleTest) else "law.")
 
 
 def starts_in(model: Model) -> tuple[RecordStart | None, ...]:

@@ -23,9 +23,9 @@ from jaxdamp.identify.model import (
     can_rest,
     initial_state_for,
     is_memoryless,
-    law_names,
     law_of,
     on_rig,
+    own_names,
     rig_of,
     with_means,
 )
@@ -97,7 +97,7 @@ def prepare(
     if initial_state == "estimated":
         model, expected, unfitted = _with_estimated_states(model, runs, sigma)
         absent = [*absent, *unfitted]
-    named = law_names(model)
+    named = own_names(model)
     stated = stated_values(model, runs)
     model = with_stated(model, stated_parameters(model, fitted_to))
     own = _per_record(model, named.find("per_record", per_record), sigma, absent, stated)
@@ -159,8 +159,7 @@ def not_chosen(model: Model | VehicleTest, over: Sequence[str] | None, *beside: 
     paths = [p.path for p in parameters(model) if not p.path.startswith(beside)]
     if over is None:
         return []
-    names = name_patterns("over", over) if isinstance(model, VehicleTest) else law_names(model).find("over", over)
-    chosen = match_paths(paths, names)
+    chosen = match_paths(paths, own_names(model).find("over", over))
     return [path for path in paths if path not in chosen]
 
 

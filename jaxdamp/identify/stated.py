@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from jaxdamp import _checks
-from jaxdamp.bench import BenchRun, initial_temperature, number_and_unit, ratio
+from jaxdamp.bench import BenchRun, initial_temperature, number_and_unit, ratio, refuse_misspelt
 from jaxdamp.dampers import (
     Scheduled,
     check_commands,
@@ -58,12 +58,16 @@ def stated_parameters(model: Model, runs: Sequence[BenchRun]) -> dict[str, list[
         runs: the records, all of which state them, or none.
 
     Raises:
-        ValueError: a number without a unit of the parameter, or outside its domain; records that do not state it.
+        ValueError: a number without a unit of the parameter, or outside its domain; records that do not state it; a
+            misspelt name.
     """
     names = {name for run in runs for name in run.settings if name != TEMPERATURE}
     if not names:
         return {}
     known = {p.path: p for p in parameters(law_of(model))}
+    for name in names:
+        if not matching([*known], name):
+            refuse_misspelt(name, [TEMPERATURE, *known, *(path.rpartition(".")[2] for path in known)])
     inside = "" if law_of(model) is model else "law."
     return {inside + path: _of_records(name, known[path], runs) for name in names for path in matching([*known], name)}
 

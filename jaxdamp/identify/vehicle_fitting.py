@@ -19,7 +19,7 @@ from jaxdamp.identify.criteria import LOSSES, criterion_in_words, priors_on, sol
 from jaxdamp.identify.estimating import estimate
 from jaxdamp.identify.judging import MOST_WARNINGS, fields_of_fit, on_status
 from jaxdamp.identify.machine import Machine, started_machine
-from jaxdamp.identify.model import VehicleTest
+from jaxdamp.identify.model import VehicleTest, own_names
 from jaxdamp.identify.noise import Noise, channel_noise
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd, Solver, search
@@ -141,9 +141,11 @@ def fit_vehicle(
     model = vehicle_test(vehicle, rides, sensors or {}, start, machine)
     varied = per_record_paths(model, per_record, len(rides))
     spread = with_values(model, {path: jnp.full(len(rides), get(model, path)) for path in varied})
-    free = free_parameters(spread, freeze=frozen_paths(model, over, freeze), bounds=bounds, tie=tie)
+    named = own_names(model)
+    limits, ties = named.find_keys("bounds", bounds), named.find_keys("tie", tie)
+    free = free_parameters(spread, freeze=frozen_paths(model, over, freeze), bounds=limits, tie=ties)
     _checks.finite("vehicle", free.values)
-    expected, drives = priors_on(free, priors or {}, 1.0), drives_of(vehicle, rides, dt)
+    expected, drives = priors_on(free, named.find_keys("priors", priors), 1.0), drives_of(vehicle, rides, dt)
     data = VehicleData(model, rides, drives, benches, float(settling), varied, samples_per_cycle, dt, expected)
     data = data.with_known_noise(noise or {})
     free = in_units(free, vehicle.units)

@@ -15,12 +15,12 @@ from jaxdamp.bench import BenchRun, RideRecord, as_runs
 from jaxdamp.dampers import AbstractDamper, Reach
 from jaxdamp.identify.criteria import Priors
 from jaxdamp.identify.machine import Machine, absent_paths
-from jaxdamp.identify.model import InitialMotion, VehicleTest
+from jaxdamp.identify.model import InitialMotion, VehicleTest, own_names
 from jaxdamp.identify.preparing import not_chosen
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.vehicle_residuals import Drive, bench_parts, driven, finer_heights, ride_batches
-from jaxdamp.parameters import FreeParameters, get, interval, match_paths, name_patterns, parameters, with_values
+from jaxdamp.parameters import FreeParameters, get, interval, match_paths, parameters, with_values
 from jaxdamp.rig import Rig, Sensor
 from jaxdamp.simulation import Exponential, RunCheck
 from jaxdamp.vehicles import AbstractVehicle, refuse_controller
@@ -170,7 +170,7 @@ def frozen_paths(model: VehicleTest, over: Sequence[str] | None, freeze: Sequenc
     for name, sensor in model.sensors.items():
         held += [f"sensors.{name}.{p.path}" for p in parameters(sensor) if p.path not in sensor.given]
     held += absent_paths(model.rig)
-    return [*held, *match_paths(paths, name_patterns("freeze", freeze))]
+    return [*held, *match_paths(paths, own_names(model).find("freeze", freeze))]
 
 
 def per_record_paths(model: VehicleTest, names: Sequence[str], count: int) -> tuple[str, ...]:
@@ -178,7 +178,7 @@ def per_record_paths(model: VehicleTest, names: Sequence[str], count: int) -> tu
     by_path = {p.path: p for p in parameters(model) if not p.path.startswith(("rig.", "starts."))}
     given = {f"sensors.{name}.{number}" for name, sensor in model.sensors.items() for number in sensor.given}
     chosen = [p for p in by_path if p.startswith("vehicle.") or p in given]
-    paths = match_paths(chosen, name_patterns("per_record", names))
+    paths = match_paths(chosen, own_names(model).find("per_record", names))
     for path in paths:
         if by_path[path].value.ndim or count < 2:
             value = f"{path}, with {count} record(s)" if count < 2 else f"{path}, a vector"

@@ -70,6 +70,7 @@ def test_a_named_manifest_and_what_wins(folder):
         ("[columns", "is no valid TOML"),
         ("[units]\nstrok = 'mm'", "Did you mean 'stroke'"),
         ("command = 'current'", r"a setting that is a number.*'current'.*Its settings: none"),
+        ("[settings.'*']\nTemprature = '80 degC'", "spelt right, but is 'Temprature'. Did you mean 'temperature'"),
         ("[settings.'*mm']", r"fit the records, but is '\*mm'\. It does not fit"),
     ],
 )
@@ -97,6 +98,7 @@ def test_settings_from_names():
     assert settings_by_name(["front_3"], "{axle}_{clicks}")["front_3"] == {"axle": "front", "clicks": 3.0}
     with pytest.raises(ValueError, match=r"one value, as current of '5mm_3.0Hz_0.5A', but is 0.5 and 2"):
         settings_by_name(names, {"*_{current}A": {}, "5mm*": {"current": 2}})
+    assert settings_by_name(names, {"5mm*": {"oil_temperature": 3.0, "temper": 1.0}})[names[0]]["temper"] == 1.0
     with pytest.raises(ValueError, match="It does not fit 25mm"):
         settings_by_name(names, "5mm_*_{current}A")
     with pytest.raises(ValueError, match="a word of its own"):

@@ -31,6 +31,7 @@ def test_a_page_of_a_law_with_a_record(tmp_path: Path, monkeypatch: pytest.Monke
     assert [record["name"] for record in data["records"]] == ["run"]
     assert data["baseline"]["numbers"][0]["start"] == [1500.0]
     assert "--replace" in refused(tmp_path, "explore", "front.json")
-    assert "one wheel" in refused(tmp_path, "explore", "front.json", "--vehicle", "half_car_002", "--file", "other.html")
+    again = ("explore", "front.json", "--vehicle", "half_car_002", "--file", "other.html")
+    assert "one wheel" in refused(tmp_path, *again)
     for command in ("explore", "export"):  # as in every command, it is a folder
         assert "name it with --file" in refused(tmp_path, command, "front.json", "--out", "other")

@@ -105,6 +105,7 @@ def test_records_that_do_not_state_it_well_are_refused(runs):
         ({"pressure": "20"}, "state pressure of 'fast 1' in a unit of it, but is '20'"),
         ({"pressure": "20 mm"}, "state pressure of 'fast 1' in a unit of it, but is '20 mm'"),
         ({"pressure": "-20 bar"}, "have pressure"),
+        ({"terms.1.presure": "20 bar"}, "Did you mean 'terms.1.pressure'"),
     ]:
         wrong = [dataclasses.replace(run, settings=settings) if run.name == "fast 1" else run for run in runs]
         with pytest.raises(ValueError, match=words):

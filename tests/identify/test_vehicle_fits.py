@@ -12,11 +12,11 @@ from jaxdamp.dampers import Bilinear, CoulombFriction, Linear
 from jaxdamp.identify import vehicle_residuals
 from jaxdamp.identify.model import VehicleTest
 from jaxdamp.identify.problem import linearised
-from jaxdamp.identify.vehicle_preparing import drives_of
+from jaxdamp.identify.vehicle_preparing import drives_of, frozen_paths, per_record_paths, vehicle_test
 from jaxdamp.identify.vehicle_residuals import ride_batches
 from jaxdamp.parameters import free_parameters, parameters, replace
 from jaxdamp.rig import Rig, Sensor
-from jaxdamp.vehicles import Guide, Guided, QuarterCar
+from jaxdamp.vehicles import Guide, Guided, QuarterCar, presets
 
 
 CAR = QuarterCar(300.0, 40.0, 20e3, 180e3, Linear(1500.0))
@@ -51,6 +51,13 @@ def test_motions_give_all_ratios_and_say_that_the_scale_is_free(motions):
     assert len(motions.warnings) == 1 and "vehicle.sprung_mass was held at 330" in motions.warnings[0]
     larger = {name: 1.1 * float(getattr(CAR, name)) for name in FREE[:-1]} | {"damper.rate": 1.1 * 1500.0}
     assert_recovered(motions, replace(CAR, larger))
+
+
+def test_a_name_is_that_of_the_vehicle_alone_if_it_is_a_whole_path_there():
+    model = vehicle_test(presets.truck_001(), [], {}, "rest", None)
+    assert frozen_paths(model, None, ["pitch_inertia"]) == ["vehicle.pitch_inertia"]
+    assert "vehicle.tandem.pitch_inertia" in frozen_paths(model, ["pitch_inertia"], [])
+    assert per_record_paths(model, ["pitch_inertia"], 2) == ("vehicle.pitch_inertia",)
 
 
 def test_the_weights_are_the_noise_of_each_channel(motions):
