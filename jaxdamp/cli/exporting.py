@@ -49,7 +49,15 @@ class OneFile:
 
 
 def export_command(
-    screen: Screen, law: Path, *, to: str, part: str = "whole", velocities: str | None = None, output: OneFile
+    screen: Screen,
+    law: Path,
+    *,
+    to: str,
+    part: str = "whole",
+    velocities: str | None = None,
+    show_units: str | None = None,
+    show_sign: str | None = None,
+    output: OneFile,
 ) -> None:
     """Write a law as C, as FMU or as the table of a simulator; or a whole vehicle, or its controller, as C or FMU.
 
@@ -58,8 +66,15 @@ def export_command(
         to: adams, assetto-corsa, c, carsim, csv, fmu or matlab.
         part: whole, or controller for the controller of a vehicle alone, as c or fmu.
         velocities: of a table, FROM:TO:POINTS [m/s]; those the law was fitted to, or -1:1:41.
+        show_units: units of a table as csv: SI, metric (N, mm/s), imperial (lbf, in/s), or a force and a velocity such
+            as kgf,mm/s; --units means this too.
+        show_sign: direction in which it counts positive: rebound-positive or compression-positive.
     """
     _checks.one_of("to", to, sorted(PROGRAMS | TABLES))
+    if to != "csv":
+        for name, given in (("show_units", show_units), ("show_sign", show_sign)):
+            if given is not None:
+                _checks.refuse(name, f"be left out for {to}", given, "Its reader wants units and sign as they are.")
     ending, write = (PROGRAMS | TABLES)[to]
     file = output.checked(law.stem.replace("-", "_") + ending)
     if to in PROGRAMS:

@@ -3,11 +3,13 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+import numpy as np
+
 from jaxdamp import _checks
 from jaxdamp._display import display
 from jaxdamp._tables import typeset_unit
 from jaxdamp.bench import ratio
-from jaxdamp.cli.words import Bound, Limit, quantity
+from jaxdamp.cli.words import Axis, Bound, Limit, quantity
 from jaxdamp.parameters import match_paths, parameters
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -54,6 +56,27 @@ def bounds_in_si(bounds: Mapping[str, tuple[Bound, Bound]], models: Iterable[obj
     units = {p.path: p.unit for model in models if with_unit for p in parameters(model)}
     of = {name: units[match_paths(list(units), [name])[0]] for name in with_unit}
     return {name: tuple(_in_si("bound", name, end, of.get(name, "")) for end in span) for name, span in bounds.items()}
+
+
+def axes_in_si(over: Mapping[str, Axis], car: AbstractVehicle) -> dict[str, np.ndarray]:
+    """The axes of a sweep by path, last part or pattern, in SI.
+
+    Arguments:
+        over: as `words.axis` reads them.
+        car: whose parameters they are of.
+
+    Raises:
+        ValueError: a unit of something else, or of no parameter.
+    """
+    units = {p.path: p.unit for p in parameters(car)}
+    found = dict[str, np.ndarray]()
+    for name, (values, written) in over.items():
+        factor = ratio(written, units[match_paths(list(units), [name])[0]]) if written else 1.0
+        if factor is None:
+            unit = units[match_paths(list(units), [name])[0]]
+            _checks.refuse("over", f"be in a unit of {name}, such as {unit or 'none'}", repr(written))
+        found[name] = factor * values
+    return found
 
 
 def _in_si(option: str, word: str, end: Bound, unit: str) -> Bound:

@@ -61,7 +61,8 @@ NAMES = {  # of options that differ from the argument, by function or for all; t
     "identify.fit_vehicle start": "initial_motion",
 }
 ALIASES = {"--force": "--replace", "--metrics": "--metric"}  # names of before, which still work
-ALIASES_OF = {command: {"--sign": "--show-sign"} for command in ("ride", "tune", "sweep")}  # which read no records
+READ_NO_RECORDS = ("ride", "tune", "sweep", "export")
+ALIASES_OF = {command: {"--sign": "--show-sign"} for command in READ_NO_RECORDS}
 SHORT = {"verbose": "-v"}
 
 
@@ -108,7 +109,7 @@ WRITTEN = {  # by the name of the option, where its type does not say it
 
 TYPES = (  # pattern of one alternative of an annotation, and how it is written; the first that fits an alternative
     (r"Mapping\[str, tuple\[", Written(SPANS, "NAME=LOWER:UPPER")),
-    (r"Mapping\[str, np\.ndarray\]", Written(words.axes, "NAME=VALUES")),
+    (r"Mapping\[str, Axis\]", Written(words.axes, "NAME=VALUES")),
     (r"Mapping\[str, (float|int)[ |floatin]*\]", Written(words.named(float), "NAME=NUMBER")),
     (r"Mapping\[str, str( \| int)?( \| None)?\]", Written(words.named(str), "NAME=TEXT")),
     (
@@ -152,7 +153,8 @@ TEXTS = {  # help where the docstring speaks of Python only, by option, or by co
     "over": "Parameters to change, by path, last part or pattern; what a workshop can change if left out.",
     "fit over": "Parameters to fit, by path, last part or pattern; all if left out.",
     "fit-vehicle over": "Parameters of the vehicle to fit, by path, last part or pattern; all if left out.",
-    "sweep over": "Axes: damper.rate=1000:8000:15 are 15 values, sprung_mass=1000;1200 two.",
+    "sweep over": "Axes: damper.rate=1000:8000:15 are 15 values, sprung_mass=1000;1200 two; in SI, or with units, "
+    "sprung_mass=800lb:1200lb:5.",
     "bound": "Limits of parameters, in their SI unit or in one that is named.",
     "tune bound": "Bounds of parameters, in their SI unit or in one that is named; a third to three times the start if "
     "left out.",

@@ -88,7 +88,8 @@ class Results:
         """Move the draft into a folder that exists; the files of this run there are replaced, others and links kept."""
         if not self._begun:
             self._keep_previous(fresh)
-        self._tell(self.target, missing or "what was being moved here when the run ended")
+        moved = f'what was being moved here when the run ended; nothing if {MANIFEST} has "complete": true'
+        self._tell(self.target, missing or moved)
         for name in fresh:
             os.replace(self.draft / name, own_place(self.target, name, self._keep, replace=name in own))
         self._tell(self.target, missing)

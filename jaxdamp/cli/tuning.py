@@ -16,10 +16,11 @@ from jaxdamp.cli.choosing import choose, settings_of
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.controlling import Controlling
 from jaxdamp.cli.jobs import Output, job, write_tables
-from jaxdamp.cli.limits import bounds_in_si, in_si
+from jaxdamp.cli.limits import axes_in_si, bounds_in_si, in_si
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.riding import Driving, beyond_vehicles, headline, unusual
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, read_module, with_law, write_laws
+from jaxdamp.cli.words import Axis
 from jaxdamp.control import Controlled
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import match_paths, parameters
@@ -186,7 +187,7 @@ def sweep_command(
     vehicle: str,
     road: str,
     *,
-    over: Mapping[str, np.ndarray],
+    over: Mapping[str, Axis],
     start: Path | None = None,
     metric: Sequence[str] = ("comfort", "travel", "grip"),
     limit: Mapping[str, Any] | None = None,
@@ -215,17 +216,18 @@ def sweep_command(
     limit_spans(limits, names, dict.fromkeys(names, 1.0))  # refuses what is no limit before anything is driven
     beside = None if baseline is None else _baseline(baseline, car)
     ride = Ride(car, surface, metrics=names, **run)
-    ride({name: values[0] for name, values in over.items() if not ride.out_of_domain({name: values[:1]})[0]})
+    axes = axes_in_si(over, car)
+    ride({name: values[0] for name, values in axes.items() if not ride.out_of_domain({name: values[:1]})[0]})
     screen.points(said)
     screen.points(unusual(road, driving.speed), style="yellow")
     with job(screen, "sweep", output, resume=resume) as work:
         with screen.stage("Driving") as advance, warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             shown = {"progress": lambda done, total: advance(f"{done} of {total} points", done)}
-            data = sweep(ride, over, **how.arguments(file=kept_file("sweep.nc"), **shown))
-        remarks = beyond_vehicles(car, over) + [str(warning.message) for warning in caught]
-        at = _present(car, over)
-        at_start = {name: float(value) for name, value in ride(at if len(at) == len(over) else None).items()}
+            data = sweep(ride, axes, **how.arguments(file=kept_file("sweep.nc"), **shown))
+        remarks = beyond_vehicles(car, axes) + [str(warning.message) for warning in caught]
+        at = _present(car, axes)
+        at_start = {name: float(value) for name, value in ride(at if len(at) == len(axes) else None).items()}
         spans = limit_spans(limits, names, at_start)
         before = None if beside is None else dict(ride.of_vehicle(beside)())
         table = data.jaxdamp.table()

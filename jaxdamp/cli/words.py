@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -188,23 +188,33 @@ def _end(text: str, with_unit: bool) -> Bound:
     return text if with_unit or text.endswith("%") else float(text) if text else None
 
 
-def axis(text: str) -> np.ndarray:
-    """The values of an axis: "1000:8000:15" are 15 of them, "1000;1200" two.
+class Axis(NamedTuple):
+    """The values of an axis of a sweep, in their unit; in SI where it is empty."""
 
-    >>> axis("1000:2000:3").tolist(), axis("1;2").tolist()
-    ([1000.0, 1500.0, 2000.0], [1.0, 2.0])
+    values: np.ndarray
+    unit: str
+
+
+def axis(text: str) -> Axis:
+    """The values of an axis: "1000:8000:15" are 15 of them, "1000;1200" two, each with its unit or all in SI.
+
+    >>> axis("1000:2000:3").values.tolist(), axis("5 lbf s/in;9 lbf s/in")
+    ([1000.0, 1500.0, 2000.0], Axis(values=array([5., 9.]), unit='lbf s/in'))
     """
     first, *more = text.split(":")
-    if more:
-        last, count = more
-        return np.linspace(float(first), float(last), int(count))
-    return np.array([float(number) for number in text.split(";")])
+    count = int(more.pop()) if more else None
+    ends = text.split(";") if count is None else [first, *more]
+    numbers, units = zip(*(quantity(end.strip()) or (float(end), "") for end in ends), strict=True)
+    if len(set(units)) > 1 or (count is not None and len(numbers) != 2):
+        raise ValueError(text)
+    return Axis(np.array(numbers) if count is None else np.linspace(numbers[0], numbers[1], count), units[0])
 
 
-def axes(option: str, given: Sequence[str]) -> dict[str, np.ndarray]:
+def axes(option: str, given: Sequence[str]) -> dict[str, Axis]:
     """The axes of a sweep by parameter, each of one value or more."""
-    found = named(axis, "read like NAME=FIRST:LAST:COUNT or NAME=A;B;C")(option, given)
-    for name, values in found.items():
+    must = "read like NAME=FIRST:LAST:COUNT or NAME=A;B;C, each with its unit or all in SI"
+    found = named(axis, must)(option, given)
+    for name, (values, _) in found.items():
         if not values.size:
             _checks.refuse(option, "have one value or more on each axis", name)
     return found

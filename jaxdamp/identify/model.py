@@ -167,8 +167,8 @@ def own_names(model: Model | VehicleTest) -> OwnNames:
         model: a law, alone or on a machine, or a vehicle with its sensors.
     """
     part = fitted_part(model)
-    known = [] if part is model else [[p.path for p in parameters(tree)] for tree in (part, model)]
-    return OwnNames(*known or ([], []), "vehicle." if isinstance(model, VehicleTest) else "law.")
+    alone, beside = ([] if part is model else [p.path for p in parameters(tree)] for tree in (part, model))
+    return OwnNames(alone, beside, "vehicle." if isinstance(model, VehicleTest) else "law.")
 
 
 def starts_in(model: Model) -> tuple[RecordStart | None, ...]:

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from jaxdamp.cli.exporting import PROGRAMS, TABLES
@@ -49,6 +50,17 @@ def test_velocities(law: Path) -> None:
     to_json(with_fitted_range(LAW, FittedRange(velocity=(-0.2, 0.3))), fitted)
     assert " from -0.2 to 0.3 m/s" in jaxdamp("export", fitted, "--to", "adams").output
     assert "\n      0.000000        0.000000\n" in (law.parent / "fitted.dpr").read_text()
+
+
+def test_a_table_in_the_units_and_the_sign_of_a_shop(law: Path) -> None:
+    jaxdamp("export", law, "--to", "csv", "--velocities", "-0.254:0.508:4")
+    si = np.loadtxt((law.parent / "front_law.csv"), delimiter=",", skiprows=1, comments=("#", "velocity"))
+    shop = ("--units", "imperial", "--sign", "compression-positive", "--replace")
+    jaxdamp("export", law, "--to", "csv", "--velocities", "-0.254:0.508:4", *shop)
+    assert "velocity [in/s],force [lbf]" in (law.parent / "front_law.csv").read_text()
+    shown = np.loadtxt((law.parent / "front_law.csv"), delimiter=",", skiprows=1, comments=("#", "velocity"))
+    np.testing.assert_allclose(shown, -si[::-1] / [0.0254, 4.4482216152605], rtol=1e-12)
+    assert "must be left out for carsim" in refused(law.parent, "export", law, "--to", "carsim", *shop)
 
 
 def test_refusals(law: Path) -> None:

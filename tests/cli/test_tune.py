@@ -111,13 +111,21 @@ def test_a_limit_that_is_not_met_ends_with_an_exit_code(tmp_path: Path) -> None:
 @pytest.mark.pictures
 def test_sweep_of_a_vehicle_from_a_file_writes_a_table_and_pictures(law: Path, tmp_path: Path) -> None:
     to_json(vehicles.presets.half_car_002(), tmp_path / "car.json")
-    words = ["--over", "front.damper.rate=1000:2000:2", "--over", "rear.damper.rate=800;1600", "--metric", "comfort"]
+    words = [
+        "--over",
+        "front.damper.rate=1000:2000:2",
+        "--over",
+        "rear.damper.rate=0.8 N s/mm;1.6 N s/mm",
+        "--metric",
+        "comfort",
+    ]
     words += ["--limit", "travel=0.076,grip=550", "--baseline", law]
     out = tmp_path / "swept"
     jaxdamp("sweep", tmp_path / "car.json", "bump:0.05:4", "--duration", "1.5", "--dt", "2e-3", *words, "--out", out)
     rows = list(csv.DictReader((out / "sweep.csv").read_text().splitlines()))
     assert len(rows) == 4 and "weighted_rms_sprung_acceleration [m/s²]" in rows[0]
     largest = (("working_space", 0.076), ("tyre_load", 550.0))
+    assert {float(row["rear.damper.rate [N s/m]"]) for row in rows} == {800.0, 1600.0}
     limits = {name: most for word, most in largest for name in rows[0] if word in name}
     within = [row for row in rows if all(float(row[name]) <= most for name, most in limits.items())]
     assert len(limits) == 4 and 0 < len(within) < 4
@@ -200,6 +208,8 @@ WRONG = [
     (["sweep", "quarter_car_000", "white:C", "--over", "rate=1:2"], "NAME=FIRST:LAST:COUNT"),
     (["sweep", "quarter_car_000", "white:C", "--over", "rate=1:2:x"], "NAME=FIRST:LAST:COUNT"),
     (["sweep", "quarter_car_000", "white:C", "--over", "rate=1:2:0"], "have one value or more"),
+    (["sweep", "quarter_car_000", "white:C", "--over", "rate=1 N s/m;2"], "each with its unit or all in SI"),
+    (["sweep", "quarter_car_000", "white:C", "--over", "rate=1mm;2mm"], "in a unit of rate, such as N s/m"),
     (["sweep", "quarter_car_000", "white:C", "--over", "rat=1;2"], "did you mean 'rate'"),
     (["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--metric", "confort"], "Did you mean 'comfort'?"),
     (["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--limit", "trawel=1"], "Did you mean 'travel'?"),
@@ -226,4 +236,5 @@ def test_wrong_words_are_refused(law: Path, tmp_path: Path, words: list[str], me
         files["CAR"] = tmp_path / "car.json"
         to_json(vehicles.presets.quarter_car_000(), files["CAR"])
     message = message.format_map({word: str(file) for word, file in files.items()})
-    assert message in refused(tmp_path, *(files.get(word, word) for word in words), "--out", tmp_path / "out")
+    place = "--file" if words[0] == "export" else "--out"
+    assert message in refused(tmp_path, *(files.get(word, word) for word in words), place, tmp_path / "out")
