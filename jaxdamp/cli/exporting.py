@@ -106,6 +106,8 @@ def explore(
     duration: float | None = None,
     seed: int = 0,
     how: Annotated[Call, "export.to_explorer"],
+    show_units: str | None = None,
+    show_sign: str | None = None,
     output: OneFile,
 ) -> None:
     """Write a law as one page for the browser: sliders, loops, records and a ride, live and without a network.
@@ -116,7 +118,11 @@ def explore(
         speed: of the vehicle [m/s].
         duration: of the ride [s]; the road's own, or 10.
         seed: of random roads.
+        show_units: units of the page: SI, metric (N, mm/s), imperial (lbf, in/s), or a force and a velocity such as
+            kgf,mm/s; --units without quantities means this too.
+        show_sign: direction in which it counts positive: rebound-positive or compression-positive.
     """
+    del show_units, show_sign  # what shows numbers asks for them
     file, damper = output.checked(f"{law.stem}.html"), read_law("law", law)
     kind, _, word = road.partition(":")
     how_long = duration or USUAL

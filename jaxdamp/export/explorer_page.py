@@ -13,6 +13,7 @@ import jax
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._display import COMPRESSION, Display, display
 from jaxdamp._field_types import check_module
 from jaxdamp._tables import Contents
 from jaxdamp._words import class_words, first_upper, metric_words
@@ -113,7 +114,8 @@ def to_explorer(
     stroke, in sines or under the motion of a record with RMSE and fit; a ride on a road, with the metrics of `Ride`,
     spectra and channels beside the baseline. A CSV dropped onto the page is another record. "Save law as JSON" gives
     a file that `from_json` reads. Law, step of the vehicle and metrics are functions of this library, printed as
-    JavaScript: the numbers are those of `respond` and `Ride` to rounding.
+    JavaScript: the numbers are those of `respond` and `Ride` to rounding. Numbers are shown in SI, unless a command
+    shows other units.
 
     Arguments:
         law: any law or composition.
@@ -174,7 +176,7 @@ def to_explorer(
     programs = "".join(closed(name, texts) for name, texts in functions.items())
     programs += closed("ROAD", {"bump": bump_function()})
     programs += "const BASELINE = LAW;\n" if baseline is None else ""
-    return write_whole(file, _assembled(data, programs))
+    return write_whole(file, _assembled(data | {"shown": _shown(data)}, programs))
 
 
 def _of_profile(road: AbstractRoad | str, ride: Ride) -> Contents:
@@ -198,6 +200,7 @@ def _of_car(car: RideProgram) -> Contents:
     vehicle = car.vehicle
     channels = [
         {"name": name, "title": metric_words(name), "unit": vehicle.units[name], "meaning": vehicle.descriptions[name]}
+        | {"signed": display().signed(metric_words(name))}
         for name in car.needed
     ]
     return {
@@ -207,11 +210,30 @@ def _of_car(car: RideProgram) -> Contents:
     }
 
 
+def _shown(data: Contents) -> Contents:
+    """Units and sign in which the page shows its numbers, which are in SI: for each unit another one and the factor."""
+    numbers = [*data["law"]["numbers"], *data["vehicle"]["numbers"], *data["metrics"], *data["channels"]]
+    units, shown = sorted({number["unit"] for number in numbers} | {"N", "m", "m/s"}), display()
+    others = {unit: [other.unit, other.factor] for unit in units if (other := shown.of(unit)).factor != 1.0}
+    return {"units": others, "turned": shown.sign == COMPRESSION}
+
+
+def _units_in_words(shown: Display) -> str:
+    """Units and sign of the page, for its reader."""
+    stroke = "Stroke and velocity are positive in rebound (extension), force is positive when it resists extension."
+    if shown.sign == COMPRESSION:
+        stroke = "Stroke, velocity and force are positive in compression; formulas count rebound positive."
+    return (
+        f"{'SI units' if shown.units == 'SI' else f'Units {shown.units}; speed, bump and sines as written'}. {stroke}"
+    )
+
+
 def _assembled(data: Contents, programs: str) -> str:
     """The page of its parts."""
     text = {name: (_PARTS / name).read_text(encoding="utf-8") for name in ("page.html", "style.css", *_SCRIPTS)}
     parts = {
         "style": text["style.css"],
+        "units": _units_in_words(display()),
         "version": importlib.metadata.version("jaxdamp"),
         "data": json.dumps(data, allow_nan=False).replace("<", "\\u003c"),
         "programs": programs,

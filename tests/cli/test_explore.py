@@ -27,10 +27,14 @@ def test_a_page_of_a_law_with_a_record(tmp_path: Path, monkeypatch: pytest.Monke
     found = re.search(r'id="data">(.*?)</script>', text, re.DOTALL)
     assert found is not None
     data = json.loads(found[1])
+    assert data["shown"] == {"units": {}, "turned": False}
     assert (data["road"]["class"], data["road"]["speed"], data["count"]) == ("D", 15.0, 2001)
     assert [record["name"] for record in data["records"]] == ["run"]
     assert data["baseline"]["numbers"][0]["start"] == [1500.0]
     assert "--replace" in refused(tmp_path, "explore", "front.json")
+    options += ["--units", "imperial", "--show-sign", "compression-positive", "--replace"]
+    jaxdamp("explore", "front.json", "run.csv", *options)
+    assert '"turned": true' in Path("front.html").read_text(encoding="utf-8")
     again = ("explore", "front.json", "--vehicle", "half_car_002", "--file", "other.html")
     assert "one wheel" in refused(tmp_path, *again)
     for command in ("explore", "export"):  # as in every command, it is a folder

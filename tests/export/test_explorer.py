@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import Ride, plots, respond, simulate
+from jaxdamp._display import Display, shown_in
 from jaxdamp._types import Number
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import (
@@ -157,6 +158,28 @@ def test_loops_records_and_their_fit(tmp_path, browser):
     np.testing.assert_allclose(shown, expected, CLOSE, 1e-9)
     browser.type("#frequencies", "fast")
     assert "positive numbers" in browser.evaluate("document.getElementById('loopError').textContent")
+    assert not browser.troubles()
+
+
+def test_units_and_sign_of_a_shop(tmp_path, browser):
+    measured = record(VALVE)
+    with shown_in(Display("imperial", "compression-positive")):
+        page(VALVE, tmp_path, browser, records=[measured])
+    x, y = browser.evaluate("[charts.loopVelocity.axes.x, charts.loopVelocity.axes.y]")
+    assert (x["unit"], y["unit"]) == ("in/s", "lbf")
+    np.testing.assert_allclose([x["scale"], y["scale"]], [1.0 / 0.0254, 1.0 / 4.4482216152605])
+    drawn = browser.evaluate("[charts.loopVelocity.series[0].x[9], charts.loopVelocity.series[0].y[9]]")
+    np.testing.assert_allclose(drawn, [-measured.velocity[9], -measured.force[9]])
+    assert browser.evaluate("charts.loopStroke.axes.x.unit") == "in"
+    rmse = browser.evaluate("get('fits').querySelector('td').textContent")
+    np.testing.assert_allclose(float(rmse.removesuffix(" lbf")), 5.0 / 2**0.5 / 4.448, rtol=0.02)
+    box = "document.querySelector('[data-path=rebound_rate]')"
+    assert float(browser.evaluate(f"{box}.value")) == pytest.approx(2800.0 * 0.0254 / 4.4482216, rel=1e-3)
+    browser.type("[data-path=rebound_rate]", "20")
+    assert number(browser, "rebound_rate") == pytest.approx(20.0 * 4.4482216152605 / 0.0254)
+    units = browser.evaluate("[...document.querySelectorAll('#metrics .unit')].map((cell) => cell.textContent)")
+    assert {"in", "lbf", "m/s²"} <= set(units)
+    assert "positive in compression" in browser.evaluate("document.body.textContent")
     assert not browser.troubles()
 
 

@@ -15,20 +15,20 @@ function element(tag, attributes = {}, ...children) {
 // One number of a parameter: entry k of its values.
 class Control {
   constructor(number, k, values, changed) {
-    Object.assign(this, { number, k, values, changed });
+    Object.assign(this, { number, k, values, changed, ...shownIn(number.unit) });
     this.start = number.start[k];
     [this.low, this.high] = number.ranges[k];
     this.log = this.low > 0 && this.high / this.low > 2 || this.high < 0 && this.low / this.high > 2;
     const label = number.path + (number.scalar ? "" : `[${k}]`), said = label.replaceAll("_", " "), dot = said.lastIndexOf(".") + 1;
     const name = element("span", { class: "name" }, element("small", {}, said.slice(0, dot).replaceAll(".", " ")), said.slice(dot));
-    name.append(element("small", {}, number.unit ? ` [${unitText(number.unit)}]` : ""));
+    name.append(element("small", {}, this.unit ? ` [${this.unit}]` : ""));
     this.box = element("input", { type: "number", step: "any", "aria-label": label, "data-path": label });
     this.slider = element("input", { type: "range", min: 0, max: SLIDER_STEPS, step: 1, "aria-label": `${label}, slider`, "data-slider": label });
-    this.undo = element("button", { type: "button", title: `back to ${readable(this.start)}`, "aria-label": `reset ${label}`, "data-reset": label }, "↺");
+    this.undo = element("button", { type: "button", title: `back to ${readable(this.scale * this.start)}`, "aria-label": `reset ${label}`, "data-reset": label }, "↺");
     this.error = element("div", { class: "error", role: "alert" });
     this.row = element("div", { class: "control", title: `${number.meaning}\n${number.domain}` },
       name, this.slider, this.box, this.undo, this.error);
-    this.box.addEventListener("input", () => this.take(this.box.value === "" ? NaN : Number(this.box.value), "box"));
+    this.box.addEventListener("input", () => this.take(this.box.value === "" ? NaN : Number(this.box.value) / this.scale, "box"));
     this.slider.addEventListener("input", () => this.take(this.at(this.slider.value / SLIDER_STEPS), "slider"));
     this.undo.addEventListener("click", () => this.reset());
     this.show("both");
@@ -50,7 +50,7 @@ class Control {
     if (!Number.isFinite(value)) return "It must be a number.";
     if (value < lower || value > upper || (lowerOpen && value <= lower) || (upperOpen && value >= upper)) return `It must be ${domain}.`;
     const [before, after] = [this.values[this.k - 1], this.values[this.k + 1]];
-    if (ordered && (value <= before || value >= after)) return `It must lie between its neighbours, ${before} and ${after}.`;
+    if (ordered && (value <= before || value >= after)) return `It must lie between its neighbours, ${[before, after].map((end) => this.scale === 1 ? end : readable(this.scale * end)).join(" and ")}.`;
     return "";
   }
 
@@ -66,7 +66,7 @@ class Control {
   show(what) {
     const value = this.values[this.k];
     this.box.dataset.value = value;
-    if (what === "both") this.box.value = String(Number(value.toPrecision(DIGITS)));  // counted as it is
+    if (what === "both") this.box.value = String(Number((this.scale * value).toPrecision(DIGITS)));  // counted as it is
     if (value < this.low || value > this.high) {
       [this.low, this.high] = [Math.min(value, this.low), Math.max(value, this.high)];
       this.log = this.log && this.low * this.high > 0;

@@ -19,6 +19,14 @@ const sides = {
 };
 const state = { substeps: DATA.substeps, controls: [], road: null, dropped: null, results: {} };
 
+// The unit in which numbers of an SI unit are shown, and the factor; in drawings and tables mm for m.
+function shownIn(unit) {
+  const [text, scale] = DATA.shown.units[unit] || [unit, 1];
+  return { unit: unitText(text), scale };
+}
+const drawnIn = (unit) => unit === "m" && shownIn(unit).scale === 1 ? { unit: "mm", scale: 1000 } : shownIn(unit || "-");
+const turned = (list) => DATA.shown.turned ? list.map((value) => -value) : list;
+
 // The numbers of a group as the printed functions take them: a scalar, or an array of the entries of a vector.
 function numbersOf(numbers, taken) {
   return Object.fromEntries(numbers.map((number) => [number.name, number.scalar ? taken[number.name][0] : taken[number.name]]));
@@ -178,10 +186,10 @@ function showLoops() {
   legend(isRecord);
   get("fitNote").textContent = note;
   showFits(fits);
-  const over = (key) => drawn.map(({ loop, ...own }) => ({ ...own, x: loop[key], y: loop.force }));
-  const force = { label: "force", unit: "N" };
-  charts.loopVelocity.show({ x: { label: "velocity", unit: "m/s" }, y: force }, over("v"));
-  charts.loopStroke.show({ x: { label: "stroke", unit: "mm", scale: 1000 }, y: force }, over("x"));
+  const over = (key) => drawn.map(({ loop, ...own }) => ({ ...own, x: turned(loop[key]), y: turned(loop.force) }));
+  const force = { label: "force", ...drawnIn("N") };
+  charts.loopVelocity.show({ x: { label: "velocity", ...drawnIn("m/s") }, y: force }, over("v"));
+  charts.loopStroke.show({ x: { label: "stroke", ...drawnIn("m") }, y: force }, over("x"));
 }
 
 function legend(isRecord) {
@@ -192,10 +200,10 @@ function legend(isRecord) {
 }
 
 function showFits(fits) {
-  const cell = (side, key, unit) => element("td", { "data-value": String(fits[side][key]) }, `${readable(fits[side][key])} ${unit}`);
+  const cell = (side, key, { unit, scale }) => element("td", { "data-value": String(fits[side][key]) }, `${readable(scale * fits[side][key])} ${unit}`);
   const row = (title, key, unit) => element("tr", {}, element("th", {}, title), cell("law", key, unit), cell("baseline", key, unit));
   const head = element("tr", {}, element("th", {}), element("th", {}, "law"), element("th", {}, DATA.baseline.title));
-  get("fits").replaceChildren(...(fits.law ? [head, row("RMSE", "rmse", "N"), row("fit", "fit", "%")] : []));
+  get("fits").replaceChildren(...(fits.law ? [head, row("RMSE", "rmse", drawnIn("N")), row("fit", "fit", drawnIn("%"))] : []));
 }
 
 // Ride ------------------------------------------------------------------------------------------------------------
@@ -203,12 +211,12 @@ function showFits(fits) {
 function showMetrics() {
   const [law, baseline] = ["law", "baseline"].map((side) => state.results[side].metrics);
   const row = (metric, k) => {
-    const change = 100 * (law[k] / baseline[k] - 1), plain = metric.signed || !Number.isFinite(change), scale = metric.unit === "m" ? 1000 : 1;
+    const change = 100 * (law[k] / baseline[k] - 1), plain = metric.signed || !Number.isFinite(change), { unit, scale } = metric.unit ? drawnIn(metric.unit) : { unit: "", scale: 1 };
     const text = plain ? "" : `${change > 0 ? "+" : ""}${Math.abs(change) < 0.005 ? "0" : readable(change, 3)} %`;
     return element("tr", { "data-metric": metric.name },
       element("th", {}, metric.title), element("td", { "data-value": String(law[k]) }, readable(scale * law[k])),
       element("td", { "data-value": String(baseline[k]) }, readable(scale * baseline[k])),
-      element("td", { class: "change" }, text), element("td", { class: "unit" }, scale > 1 ? "mm" : unitText(metric.unit)));
+      element("td", { class: "change" }, text), element("td", { class: "unit" }, unit));
   };
   const rows = DATA.metrics.map(row);
   get("metrics").replaceChildren(...rows.filter((_, k) => DATA.metrics[k].main));
@@ -216,13 +224,13 @@ function showMetrics() {
 }
 
 function showChannel() {
-  const place = Number(get("channel").value), channel = DATA.channels[place], scale = channel.unit === "m" ? 1000 : 1;
-  const unit = channel.unit === "m" ? "mm" : unitText(channel.unit || "-"), drawn = { spectrum: [], trace: [] };
+  const place = Number(get("channel").value), channel = DATA.channels[place], { unit, scale } = drawnIn(channel.unit);
+  const drawn = { spectrum: [], trace: [] };
   for (const side of ["baseline", "law"]) {
     const record = state.results[side].records[place], own = side === "law" ? { colour: "law", width: 1.8 } : { colour: "baseline", width: 1.3, dash: [5, 4] };
     const spectra = (state.results[side].spectra ??= []), { frequency, psd } = (spectra[place] ??= density(record, DATA.dt, SEGMENT));
     drawn.spectrum.push({ ...own, x: frequency.subarray(1), y: psd.subarray(1) });
-    drawn.trace.push({ ...own, width: 1.2, x: record.map((_, i) => i * DATA.dt), y: record });
+    drawn.trace.push({ ...own, width: 1.2, x: record.map((_, i) => i * DATA.dt), y: channel.signed ? turned(record) : record });
   }
   const squared = /[/ ]/.test(unit) ? `(${unit})²/Hz` : unit === "-" ? "1/Hz" : `${unit}²/Hz`;
   charts.spectrum.show({ x: { label: "frequency", unit: "Hz", log: true, range: [0.4, 50] }, y: { label: "density", unit: squared, log: true, decades: 6, scale: scale ** 2 } }, drawn.spectrum);
