@@ -1,5 +1,6 @@
 """What can be told from the words and the files alone, before JAX is loaded: a mistyped path is answered at once."""
 
+import glob
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn
@@ -65,9 +66,12 @@ def _check_vehicle(path: Path) -> None:
 
 
 def require_file(argument: str, path: Path, remedy: str = "") -> None:
-    """Refuse a path where no file is."""
+    """Refuse a path where no file is; a fit by settings has the file of the name in the folder of each."""
     if not path.is_file():
-        _checks.refuse(argument, "be a file that is there", path, remedy)
+        inside = [str(file) for file in sorted(path.parent.glob(f"*/{glob.escape(path.name)}"))][:4]
+        _checks.refuse(
+            argument, "be a file that is there", path, f"Did you mean {' or '.join(inside)}?" if inside else remedy
+        )
 
 
 def read_vehicle(path: Path) -> dict[str, Any]:

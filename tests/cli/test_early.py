@@ -24,6 +24,8 @@ def test_a_wrong_path_is_answered_without_jax(tmp_path: Path) -> None:
     (tmp_path / "broken.json").write_text("{")
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "notes").write_text("mine")
+    (tmp_path / "full" / "setting_1").mkdir()
+    (tmp_path / "full" / "setting_1" / "best_law.json").write_text("{}")
     (tmp_path / "a.csv").write_text("1")
     (tmp_path / "deep.json").write_text('{"a":' + "[" * 5000 + "]" * 5000 + "}")
     (tmp_path / "deep.toml").write_text(".".join("a" * 30_000) + " = 1\n")
@@ -37,6 +39,7 @@ def test_a_wrong_path_is_answered_without_jax(tmp_path: Path) -> None:
         "sweep quarter_car_000 iso:C --over damper.rate=1:2:3 --start x.json": "Option --start must be a file",
         "report a.csv --manifest no.toml": "Option --manifest must be a file that is there, but is no.toml",
         "export no.json --to c": "LAW must be a file that is there, but is no.json",
+        "ride full/best_law.json": "Did you mean full/setting_1/best_law.json?",
         "ride deep.json": "LAW must be a law as JSON, but is deep.json, which is no JSON: it is nested too deeply",
         "tune deep.toml iso:C": "deep.toml, which is no valid TOML: a key has more than 20 parts",
         "tune latin.toml iso:C": "latin.toml, which is no TOML in UTF-8",
