@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+from jaxdamp._display import display
 from jaxdamp._types import Axes, Figure
 from jaxdamp.plots import _style
 
@@ -51,7 +52,7 @@ def head(axes: Axes, name: str, sentence: str, facts: str, *, answer: str = "", 
         look, width, top = {"fontsize": 8.5}, 118, 0.46
     else:
         look, width, top = {"fontsize": 10.5, "fontweight": "bold", "color": colour}, 80, 0.76
-    together = re.sub(r"(?<=\d) (?=[^\W\d]|%|±)|(?<=±) ", "\N{NO-BREAK SPACE}", _style.said(sentence))
+    together = re.sub(r"(?<=\d) (?=[^\W\d]|%|±)|(?<=±) ", "\N{NO-BREAK SPACE}", _style.said(display().words(sentence)))
     lines = textwrap.wrap(together, width)
     lines = [*lines[:2], f"{lines[2].rstrip(' ,;.')} …"] if len(lines) > 3 else lines
     axes.text(0.0, top, "\n".join(lines), **look, **_TEXT)
@@ -107,7 +108,7 @@ def remarks(axes: Axes, title: str, sentences: Sequence[str], *, width: int, non
         most: sentences to write.
     """
     blank(axes)
-    shown = [textwrap.shorten(_style.said(s), 3 * width, placeholder=" …") for s in sentences[:most]]
+    shown = [textwrap.shorten(_style.said(display().words(s)), 3 * width, placeholder=" …") for s in sentences[:most]]
     lines = [line for s in shown or [none] for line in textwrap.wrap(s, width, subsequent_indent="   ")]
     lines += [f"and {len(sentences) - most} more on the page"] * (len(sentences) > most)
     axes.text(0.0, 1.0, title, **_TEXT)

@@ -192,16 +192,16 @@ def label_ends(
         axes.annotate(str(line.get_label()), to, xycoords="axes fraction", **look)
 
 
-def dress(axes: Axes, x: str, y: str, title: str = "") -> None:
+def dress(axes: Axes, x: str, y: str, title: str = "", *, turns: bool = False) -> None:
     """Labels, a light grid, and no frame above and to the right; ticks in the units and the sign that are shown.
 
     The numbers drawn are those of the library: where the labels name a unit that is shown otherwise, the ticks are
-    round numbers of the other unit, and an axis of the other sign runs the other way.
+    round numbers of the other unit, and an axis of the other sign runs the other way, as an ordinate that `turns` does.
     """
     _wrap(axes.set_xlabel(display().text(x)), axes)
     _wrap(axes.set_ylabel(display().text(y)), axes)
-    for axis, label in ((axes.xaxis, x), (axes.yaxis, y)):
-        _rescale(axis, label)
+    _rescale(axes.xaxis, x)
+    _rescale(axes.yaxis, y, turns)
     if title:
         _wrap(axes.set_title(display().words(title), loc="left", fontsize="medium"), axes)
     axes.grid(True, color="0.9", linewidth=0.8)
@@ -231,7 +231,7 @@ def _longest(text: "matplotlib.text.Text", axes: Axes) -> float:
 
 
 def few_ticks(axes: Axes, most: int) -> None:
-    """At most so many ticks along the abscissa, and no more than its labels have room for.
+    """At most so many ticks along the abscissa, and no more than its labels have room for; in the unit that is shown.
 
     Arguments:
         axes: of any width.
@@ -239,20 +239,26 @@ def few_ticks(axes: Axes, most: int) -> None:
     """
     from matplotlib.ticker import MaxNLocator
 
+    before = axes.xaxis.get_major_locator()
+    if not isinstance(before, MaxNLocator):
+        before = MaxNLocator()
+    before.set_params(steps=[1, 2, 2.5, 5, 10])
+
     class Ticks(MaxNLocator):
         def tick_values(self, vmin: float, vmax: float) -> "Sequence[float]":
-            self.set_params(nbins=max(min(most, int(0.6 * axes.xaxis.get_tick_space())), 1))
-            return super().tick_values(vmin, vmax)
+            before.set_params(nbins=max(min(most, int(0.6 * axes.xaxis.get_tick_space())), 1))
+            return before.tick_values(vmin, vmax)
 
-    axes.xaxis.set_major_locator(Ticks(steps=[1, 2, 2.5, 5, 10]))
+    axes.xaxis.set_major_locator(Ticks())
 
 
-def _rescale(axis: "matplotlib.axis.Axis", label: str) -> None:
+def _rescale(axis: "matplotlib.axis.Axis", label: str, turns: bool = False) -> None:
     """Ticks of an axis in the unit and the sign that are shown, by the unit in its label."""
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
     found = re.search(r"\[([^\[\]]+)\]", label)
-    shown = display().of(found[1] if found else "", signed=display().text(label) != label and "+" in label)
+    signed = turns or (display().text(label) != label and "+" in label)
+    shown = display().of(found[1] if found else "", signed=signed)
     if shown.factor == 1.0 or axis.get_scale() != "linear":
         return
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from jaxdamp import _checks
-from jaxdamp._display import rounded
+from jaxdamp._display import display, rounded
 from jaxdamp._tables import typeset_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Axes, Figure
@@ -141,7 +141,7 @@ def _facts(damper: _Damper) -> str:
     fastest, slowest = (end(run.frequency for run in runs) for end in (max, min))
     facts = [f"{len(runs)} record{'s' * (len(runs) > 1)}"]
     facts += [f"{_style.short(slowest)} to {_style.short(fastest)} Hz" if fastest > slowest else f"{fastest:.3g} Hz"]
-    facts += [f"up to {_style.short(_MM * max(run.peak_velocity for run in runs))} mm/s"]
+    facts += [display().words(f"up to {_style.short(_MM * max(run.peak_velocity for run in runs))} mm/s")]
     facts += [f"settings {', '.join(settings)}"] * (len(settings) > 1)
     temperatures = [float(run.temperature.mean()) for run in runs if run.temperature is not None]
     facts += [f"{np.mean(temperatures) - 273.15:.0f} °C"] if temperatures else []
@@ -230,20 +230,22 @@ def _tolerances(axes: Axes, limits: LimitCheck, static: float) -> None:
 
 def _forces(axes: Axes, damper: _Damper) -> None:
     """Rebound and compression at stated velocities: of the law where there is one, otherwise measured."""
+    newton, speed = display().of("N"), display().of("mm/s")
     if damper.laws:
         reach = _MM * max(run.peak_velocity for run in damper.runs)
-        speeds = np.array([v for v in VELOCITIES if v <= 1.02 * reach] or [reach], dtype=float) / _MM
+        usual = np.array(VELOCITIES) * (1.016 if speed.unit == "in/s" else 1.0)  # round numbers of either
+        speeds = np.array([v for v in usual if v <= 1.02 * reach] or [reach], dtype=float) / _MM
         name, law = list(damper.laws.items())[-1]
         sides = np.split(np.asarray(quasi_static(law, np.concatenate([speeds, -speeds])).force), 2)
-        title = "Forces of the law [N]" + f", {name}" * (len(damper.laws) > 1)
+        title = f"Forces of the law [{newton.unit}]" + f", {name}" * (len(damper.laws) > 1)
         columns = dict(zip(("rebound", "compr."), sides, strict=True))
     else:
         speeds, columns = _measured_forces(damper)
-        title = "Measured forces [N]"
-    cells = zip(_MM * speeds, *columns.values(), strict=True)
+        title = f"Measured forces [{newton.unit}]"
+    cells = zip(speed(_MM * speeds), *map(newton, columns.values()), strict=True)
     ends = list(np.linspace(1.0, 0.3, len(columns) + 1)[:-1][::-1])
     step = min(0.066, 0.9 / (len(speeds) + 1))
-    _sheet.table(axes, title, ["mm/s", *columns], [[*map(_style.short, row)] for row in cells], ends, step=step)
+    _sheet.table(axes, title, [speed.unit, *columns], [[*map(_style.short, row)] for row in cells], ends, step=step)
 
 
 def _measured_forces(damper: _Damper) -> tuple[np.ndarray, dict[str, np.ndarray]]:
@@ -277,7 +279,7 @@ def _loops(axes: Axes, damper: _Damper) -> None:
             expected = fitted[run.name][part] - static
             axes.plot(stroke, expected, color=colour, linewidth=1.0)
     fastest, slowest = (_style.short(_MM * shown[i].peak_velocity) for i in (-1, 0))
-    speeds = f"{slowest} (dark) to {fastest} mm/s" if len(shown) > 1 else f"{fastest} mm/s"
+    speeds = f"{slowest} mm/s (dark) to {fastest} mm/s" if len(shown) > 1 else f"{fastest} mm/s"
     _style.dress(
         axes, "stroke [mm]", "force [N]", f"Loops, {speeds}" + ("\nbroad: measured, thin: law" if fitted else "")
     )
@@ -325,7 +327,8 @@ def _parameters(axes: Axes, damper: _Damper) -> None:
     if damper.fit is not None:
         rows, colours = [], []
         for e in damper.fit.parameters:
-            factor, unit = (1e3, "ms") if e.unit == "s" else (1.0, typeset_unit(e.unit, "–"))
+            shown = display().of(e.unit)
+            factor, unit = (1e3, "ms") if e.unit == "s" else (shown.factor, typeset_unit(shown.unit, "–"))
             value, error = rounded(factor * e.value, factor * 1.96 * e.standard_error)
             name = _style.path_words(e.name)
             doubtful = bool(e.note)

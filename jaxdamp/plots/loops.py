@@ -65,8 +65,9 @@ def fit_loops(result: FitResult, runs: BenchRun | Sequence[BenchRun] | None = No
     label = "fitted − measured [N]"
     _style.dress(loops, _style.VELOCITY, _style.FORCE, "Force over velocity")
     _style.dress(football, _style.STROKE, _style.FORCE, "Force over stroke")
-    _style.dress(over_velocity, _style.VELOCITY, label, "Residual over velocity")
-    _style.dress(over_time, "time in the cycle, over its period [–]", label, "Residual over the cycle, means of 1/40")
+    _style.dress(over_velocity, _style.VELOCITY, label, "Residual over velocity", turns=True)
+    over_cycle = "Residual over the cycle, means of 1/40"
+    _style.dress(over_time, "time in the cycle, over its period [–]", label, over_cycle, turns=True)
     for axes in (loops, football, over_velocity):
         _style.cross(axes)
         _style.few_ticks(axes, 7)
@@ -113,7 +114,7 @@ def loops_by_law(comparison: Comparison, record: str | None = None) -> Figure:
         axes.plot(run.velocity[part], force[part], label="law", **_style.AFTER)
         best = ", recommended" * (rung is comparison.best)
         words = f"{_style.in_words(rung.name)}: {_style.short(rung.error)}\N{NO-BREAK SPACE}N{best}"
-        _style.dress(axes, _style.VELOCITY, "force [N]", words)
+        _style.dress(axes, _style.VELOCITY, "force [N]", words, turns=True)
         _style.cross(axes)
         _style.few_ticks(axes, 4)
         axes.label_outer()
@@ -135,7 +136,9 @@ def _title(result: FitResult, runs: Sequence[BenchRun], shown: Sequence[BenchRun
     new = not any(run is fitted for run in runs for fitted in result.runs)
     records = f"{runs[0].name if len(runs) == 1 else f'{len(runs)} records'}{' not fitted' * new}"
     score = f"{_style.law_name(result.law)}: fit {percent:.1f} %, RMSE {_style.short(rmse)} N on {records}"
-    return score + (f"\n{len(shown)} of them shown, last full cycle of each" if len(shown) < len(runs) else "")
+    return display().words(score) + (
+        f"\n{len(shown)} of them shown, last full cycle of each" if len(shown) < len(runs) else ""
+    )
 
 
 def _block_means(values: Float[np.ndarray, " samples"], size: int) -> Float[np.ndarray, " blocks"]:

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
+from jaxdamp._display import display
 from jaxdamp._traced import depends
 from jaxdamp._types import Scalar, Signal
 from jaxdamp.roads import AbstractRoad, Columns, delayed
@@ -46,9 +47,9 @@ class AxleTiming(eqx.Module):
             return "axles one after the other"
         speed = None if self.speed is None else _checks.concrete(self.speed)
         if len(self.names) == 2 and delays[0] == 0:
-            place = "" if speed is None else f" ({delays[1] * speed:.4g} m at {speed:.4g} m/s)"
+            place = "" if speed is None else f" ({delays[1] * speed:.4g} m at {display().speed(speed)})"
             return f"{self.names[1]} axle {delays[1]:.3g} s behind the {self.names[0]}{place}"
-        place = "" if speed is None else f" ({_listed(delays * speed)} m at {speed:.4g} m/s)"
+        place = "" if speed is None else f" ({_listed(delays * speed)} m at {display().speed(speed)})"
         return f"axles {_listed(delays)} s behind the front of the vehicle{place}"
 
 

@@ -1,11 +1,15 @@
+import re
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from jaxdamp import plots
+from jaxdamp._display import Display, shown_in
 from jaxdamp.bench import BenchRun, BenchSet, last_steady_cycle
 from jaxdamp.identify import Comparison
-from jaxdamp.plots.loops import spread
+from jaxdamp.plots.loops import loops_by_law, spread
 
 
 def test_axes_say_what_they_show_with_unit_and_sign(comparison: Comparison) -> None:
@@ -18,6 +22,19 @@ def test_axes_say_what_they_show_with_unit_and_sign(comparison: Comparison) -> N
         (velocity, "fitted − measured [N]"),
         ("time in the cycle, over its period [–]", "fitted − measured [N]"),
     ]
+
+
+def test_pictures_in_the_units_and_the_sign_of_a_shop(comparison: Comparison) -> None:
+    with shown_in(Display("imperial", "compression-positive")):
+        panel = loops_by_law(comparison).axes[0]
+        loops = plots.fit_loops(comparison["bilinear"])
+        steps = [np.diff(np.sort(axes.get_xticks() / 0.0254))[0] for axes in (panel, loops.axes[0])]
+        sheet = comparison.plot("sheet")
+    assert all(axes.xaxis_inverted() and axes.yaxis_inverted() for axes in (panel, *loops.axes[:3]))
+    assert all(f"{step:.4e}"[:6] in ("1.0000", "2.0000", "2.5000", "5.0000") for step in steps), steps
+    said = [panel.get_title(loc="left"), loops.get_suptitle(), *(t.get_text() for t in sheet.findobj(Text))]
+    assert sum("lbf" in text for text in said) > 6
+    assert not [text for text in said if re.search(r"\[N\]|\d\s+k?N\b|N s/m|mm/s", text)]
 
 
 def test_lines_are_the_measured_and_the_fitted_last_steady_cycle(runs: BenchSet, comparison: Comparison) -> None:

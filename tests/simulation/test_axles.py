@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import Ride, roads, simulate
+from jaxdamp._display import Display, shown_in
 from jaxdamp.parameters import free_parameters, replace
 from jaxdamp.simulation.wheels import axle_timing, heights_under_wheels
 from jaxdamp.tune.measuring import Measurement
@@ -71,6 +72,8 @@ def test_the_response_says_when_each_axle_met_the_road():
     assert str(axle_timing(m113_003(), GROUND)).startswith("axles 0, 0.0334, 0.0667, 0.1, 0.133 s behind the front of")
     assert str(axle_timing(FULL, GROUND)) == "rear axle 0.144 s behind the front (2.87 m at 20 m/s)"
     assert str(axle_timing(quarter_car_000(), GROUND)) == "one axle"
+    with shown_in(Display("imperial")):
+        assert str(axle_timing(HALF, GROUND)).endswith("(2.5 m at 44.7 mph)")
     response = simulate(HALF, GROUND, duration=0.5, dt=0.002)
     sentence = next(iter(said))
     assert repr(response).endswith(f"; {sentence}") and response.to_xarray().attrs["axles"] == sentence
