@@ -43,7 +43,7 @@ _KEPT = re.compile(r"m/s(\^|²|\^2)|^m\^?[23²³]|m/km|cycle")  # accelerations,
 _EXPONENT = re.compile(r"(?<![\w.])\d(?:\.\d+)?e\+0[1-5]\b")  # two or three digits of a large number: 1.1e+03 is 1100
 _NUMBER = r"[-−+]?(?:\d+(?:\.\d+)?(?:e[-+]?\d+)?|inf)"
 _AMOUNT = re.compile(
-    rf"(?<![\w.])({_NUMBER})(?:( to | … | ± )({_NUMBER}))?([ \N{{NO-BREAK SPACE}}])"
+    rf"(?<![\w.])({_NUMBER})(?:( to | … | ± )({_NUMBER}))?([ \xa0])"
     r"(N s/m|N/mm|N/m|mm/s|m/s|mm|kN|kg|N|m|J)(?![\w²³^/·]| [ms]\b)"
 )
 _SIGNED = re.compile(

@@ -47,9 +47,9 @@ class AxleTiming(eqx.Module):
             return "axles one after the other"
         speed = None if self.speed is None else _checks.concrete(self.speed)
         if len(self.names) == 2 and delays[0] == 0:
-            place = "" if speed is None else f" ({delays[1] * speed:.4g} m at {display().speed(speed)})"
+            place = "" if speed is None else f" ({delays[1] * speed:.4g} m at {display().speed(float(speed))})"
             return f"{self.names[1]} axle {delays[1]:.3g} s behind the {self.names[0]}{place}"
-        place = "" if speed is None else f" ({_listed(delays * speed)} m at {display().speed(speed)})"
+        place = "" if speed is None else f" ({_listed(delays * speed)} m at {display().speed(float(speed))})"
         return f"axles {_listed(delays)} s behind the front of the vehicle{place}"
 
 
