@@ -9,8 +9,8 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._limits import at_least, at_most, within
-from jaxdamp._types import Scalar, ScalarLike
-from jaxdamp.dampers.table import AbstractPoints, Table
+from jaxdamp._types import Scalar, ScalarLike, VectorLike
+from jaxdamp.dampers.table import AbstractPoints, Table, checked_points
 
 
 def monotone_slopes(gaps: Float[Array, " gaps"], secants: Float[Array, " gaps"]) -> Float[Array, " gaps+1"]:
@@ -59,6 +59,9 @@ class SplineTable(AbstractPoints):
     >>> [round(float(law.force_velocity(v)), 3) for v in (0.0, 0.1, 0.2, 1.2)]
     [0.0, 233.599, 500.0, 2130.0]
     """
+
+    def __init__(self, velocity: VectorLike, force: VectorLike, *, allow_active: bool = False) -> None:
+        self.velocity, self.force_points = checked_points(velocity, force, allow_active=allow_active)
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""

@@ -63,18 +63,20 @@ def refuse_active(velocity: Array, force: Array) -> None:
         _checks.refuse("force", must, value, remedy)
 
 
+def checked_points(velocity: VectorLike, force: VectorLike, *, allow_active: bool) -> tuple[Array, Array]:
+    """The points of a curve as arrays; active ones are refused unless they are allowed."""
+    v, f = as_float(velocity, "velocity"), as_float(force, "force")
+    check_points(v, f)
+    if not allow_active:
+        refuse_active(v, f)
+    return v, f
+
+
 class AbstractPoints(AbstractMemoryless):
     """A curve through points (vₖ, Fₖ)."""
 
     velocity: Vector = setting("m/s", "velocities of the points", increasing)
     force_points: Vector = parameter("N", "forces at the points")
-
-    def __init__(self, velocity: VectorLike, force: VectorLike, *, allow_active: bool = False) -> None:
-        self.velocity = as_float(velocity, "velocity")
-        self.force_points = as_float(force, "force")
-        check_points(self.velocity, self.force_points)
-        if not allow_active:
-            refuse_active(self.velocity, self.force_points)
 
     def __check_init__(self) -> None:
         check_points(self.velocity, self.force_points)
@@ -105,6 +107,9 @@ class Table(AbstractPoints):
     force_points: Vector = parameter("N", "forces at the points", linear=True)
 
     from_csv = Elsewhere("`jaxdamp.bench.read_table(path).law()`")
+
+    def __init__(self, velocity: VectorLike, force: VectorLike, *, allow_active: bool = False) -> None:
+        self.velocity, self.force_points = checked_points(velocity, force, allow_active=allow_active)
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""
