@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from jaxdamp import bench, export, roads, vehicles
 from jaxdamp._tables import Table
@@ -121,7 +120,7 @@ def _page(
     fits: Fitted,
     truth: FitResult | None,
     rides: Mapping[str, Mapping[str, Response]],
-    tuning: TuneResult[Any] | None,
+    tuning: TuneResult | None,
     *,
     folder: Path,
     attempts: Attempts,
@@ -184,7 +183,7 @@ def _car(law: AbstractDamper) -> AbstractVehicle:
     return vehicles.presets.quarter_car_mathworks(law)
 
 
-def _tuned(screen: Screen, truth: FitResult, scenario: Scenario) -> TuneResult[Any]:
+def _tuned(screen: Screen, truth: FitResult, scenario: Scenario) -> TuneResult:
     """The fitted damper with its coefficients tuned for comfort, tried on roads that the tuning had not seen."""
     more = f"{100 * (scenario.tyre_load - 1):+.0f}%"
     screen.say(

@@ -94,9 +94,7 @@ def on_sensors(
                 if column is not None:
                     effects.append((channel, effect))
                     columns.append(column)
-    if not columns:
-        return []
-    found = _regressed(problem, end, np.stack(columns, axis=1))
+    found = _regressed(problem, end, columns)
     if found is None:
         return []
     chosen = [effect for effect, own in zip(effects, found.shown, strict=True) if own]
@@ -155,8 +153,11 @@ class _Regression(NamedTuple):
     left: float  # share of the squares that they leave
 
 
-def _regressed(problem: Problem, end: SearchEnd, columns: Float[np.ndarray, "samples effects"]) -> _Regression | None:
+def _regressed(problem: Problem, end: SearchEnd, effects: Sequence[np.ndarray]) -> _Regression | None:
     """The sizes of effects by their columns, the change of the weighted residual for each unit; None if none shows."""
+    columns = np.stack(effects, axis=1) if effects else np.zeros((0, 0))
+    if not columns.size or not np.all(np.isfinite(columns)):
+        return None
     basis, _ = np.linalg.qr(end.jacobian / np.linalg.norm(end.jacobian, axis=0).clip(1e-300))
     own, rest = (a - basis @ (basis.T @ a) for a in (columns, end.residual))
     shown = np.linalg.norm(own, axis=0) > OF_ITS_OWN * np.linalg.norm(columns, axis=0)
@@ -196,30 +197,27 @@ def friction_left_out(problem: Problem, end: SearchEnd) -> Friction | None:
     Of dry friction and friction that gives by 0.1, 0.3 or 1 mm that with the least squares is named, friction that
     gives only where it leaves clearly less than dry friction.
     """
-    model = problem.free.tree
-    places = [place for place in friction_places(model.vehicle) if place.could_give]
-    if not places:
-        return None
-
-    def of(give: float | None) -> Friction | None:
-        form = "coulomb" if give is None else "dahl"
-        columns = []
-        for place in places:
-            changed = with_laws(model.vehicle, [place], [place.with_form(form, give)])
-            columns.append(_residual(problem, dataclasses.replace(model, vehicle=changed)) - end.residual)
-        changes = np.stack(columns, axis=1)
-        found = _regressed(problem, end, changes) if np.all(np.isfinite(changes)) else None
-        sure = () if found is None else np.flatnonzero(found.shown)[-found.sizes > SURE * found.errors]
-        if found is None or not len(sure):
-            return None
-        return Friction(tuple(places[i] for i in sure), give, found.left, changes[:, sure])
-
-    dry = [of(None)] if all(place.friction is None for place in places) else [None]
-    giving = [friction for friction in map(of, GIVES) if friction is not None]
+    places = [place for place in friction_places(problem.free.tree.vehicle) if place.could_give]
+    dry = _friction(problem, end, places, None) if all(place.friction is None for place in places) else None
+    giving = [one for give in GIVES if (one := _friction(problem, end, places, give)) is not None]
     best = min(giving, key=lambda friction: friction.left, default=None)
-    if dry[0] is not None and (best is None or best.left > CLEARLY * dry[0].left):
-        best = dry[0]
+    if dry is not None and (best is None or best.left > CLEARLY * dry.left):
+        best = dry
     return best if best is not None and best.left < CLEARLY else None
+
+
+def _friction(problem: Problem, end: SearchEnd, places: Sequence[Place], give: float | None) -> Friction | None:
+    """Friction of one form where the residual shows it for sure."""
+    form, model = "coulomb" if give is None else "dahl", problem.free.tree
+    changes = []
+    for place in places:
+        changed = with_laws(model.vehicle, [place], [place.with_form(form, give)])
+        changes.append(_residual(problem, dataclasses.replace(model, vehicle=changed)) - end.residual)
+    found = _regressed(problem, end, changes)
+    sure = [] if found is None else np.flatnonzero(found.shown)[-found.sizes > SURE * found.errors]
+    if found is None or not len(sure):
+        return None
+    return Friction(tuple(places[i] for i in sure), give, found.left, np.stack(changes, axis=1)[:, sure])
 
 
 def _residual(problem: Problem, model: VehicleTest) -> Float[np.ndarray, " samples"]:

@@ -98,7 +98,7 @@ def _add_sheets(
     report: Report,
     comparison: Comparison,
     rides: Mapping[str, Mapping[str, Response]],
-    tuned: TuneResult[Any] | None,
+    tuned: TuneResult | None,
     baseline: AbstractDamper | None,
 ) -> None:
     """The damper, and its tuning or its first ride, each on one page."""
