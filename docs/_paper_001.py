@@ -253,7 +253,7 @@ STATEMENTS = (
         "body acceleration, above the front axle",
         CONTRADICTED,
         f"above the axle with the law: {PLACE}",
-        24.0,
+        24.08,
         "body acceleration above the front axle",
         unit="%",
     ),
