@@ -111,9 +111,9 @@ def _parts(computed: ast.expr) -> list[tuple[str, set[str]]]:
         return _parts(computed.left) + _parts(computed.right)
     if isinstance(computed, ast.Dict):
         pairs = zip(computed.keys, computed.values, strict=True)
-        return [(re.escape(key.value), _used(value)) for key, value in pairs if isinstance(key, ast.Constant)]
+        return [(re.escape(str(key.value)), _used(value)) for key, value in pairs if isinstance(key, ast.Constant)]
     if isinstance(computed, ast.DictComp) and isinstance(computed.key, ast.JoinedStr):
-        pieces = [re.escape(p.value) if isinstance(p, ast.Constant) else ANY for p in computed.key.values]
+        pieces = [re.escape(str(p.value)) if isinstance(p, ast.Constant) else ANY for p in computed.key.values]
         return [("".join(pieces), _used(computed))]
     return [(ANY, _used(computed))]
 
