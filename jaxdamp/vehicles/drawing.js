@@ -2,7 +2,7 @@
 // A design has what `Drawing` names, `height` [0.1 mm] of each point, `road` of each wheel, `force` [N] of each damper.
 
 class Film {
-  static LEVELS = [0.32, 0.85, 1.6];  // m, of bodies above the road
+  static level(number) { return number ? 0.1 + 0.75 * number : 0.32; }  // m, of bodies above the road
   static RADIUS = 0.3; static THICK = 0.3; static SIDE = [0.28, 0.2];  // m; what lies to the left is drawn higher
   static SHOWN = 0.25;  // m, of the largest motion in the picture
   static FACTORS = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
@@ -84,14 +84,15 @@ class Film {
   }
 
   drawVehicle(design, canvas) {
-    const { LEVELS, RADIUS, THICK, SIDE, line } = Film, { pen, width, height } = Film.prepared(canvas);
+    const { level, RADIUS, THICK, SIDE, line } = Film, { pen, width, height } = Film.prepared(canvas);
     const ahead = design.points.map((p) => p.ahead), left = design.points.map((p) => p.left);
     const low = Math.min(...ahead) - 0.6 + Math.min(0, ...left) * SIDE[0], high = Math.max(...ahead) + 0.6 + Math.max(0, ...left) * SIDE[0];
-    const top = LEVELS[Math.max(0, ...design.bodies.map((b) => b.level))] + THICK + 0.35 + Math.max(0, ...left) * SIDE[1], bottom = -0.35 + Math.min(0, ...left) * SIDE[1];
+    const top = level(Math.max(0, ...design.bodies.map((b) => b.level))) + THICK + 0.35 + Math.max(0, ...left) * SIDE[1], bottom = -0.35 + Math.min(0, ...left) * SIDE[1];
     const scale = Math.min(width / (high - low), height / (top - bottom)), middle = 0.5 * (low + high);
     const place = (x, side, z) => [width / 2 + (x + SIDE[0] * side - middle) * scale, height - (z + SIDE[1] * side - bottom) * scale];
     const lift = (tenths) => this.factor * tenths * 1e-4;
-    const point = (k, raised = 0) => { const p = design.points[k]; return place(p.ahead, p.left, LEVELS[p.level] + raised + lift(this.at(p.height))); };
+    const point = (k, raised = 0) => { const p = design.points[k]; return place(p.ahead, p.left, level(p.level) + raised + lift(this.at(p.height))); };
+    const foot = (k) => point(k, design.points[k].level ? THICK : 0);  // of what stands on a body
     const text = Film.colour("text"), ink = Film.colour("quiet");
     const sides = new Map();  // the road of each side, under its first wheel
     for (const wheel of design.wheels) { const p = design.points[wheel.point]; if (!sides.has(p.left)) sides.set(p.left, wheel); }
@@ -121,9 +122,9 @@ class Film {
         pen.fillStyle = Film.colour("body"); pen.globalAlpha = 0.75; pen.fill(); pen.globalAlpha = 1; pen.strokeStyle = text; pen.lineWidth = 1.2; pen.stroke();
       }
     }
-    for (const ends of design.springs) Film.drawSpring(pen, point(ends[0]), point(ends[1]), text);
+    for (const ends of design.springs) Film.drawSpring(pen, point(ends[0]), foot(ends[1]), text);
     for (const damper of design.dampers) {
-      const upper = point(damper.ends[0]), lower = damper.ends[1] < 0 ? design.wheels[-1 - damper.ends[1]].centre : point(damper.ends[1]);
+      const upper = point(damper.ends[0]), lower = damper.ends[1] < 0 ? design.wheels[-1 - damper.ends[1]].centre : foot(damper.ends[1]);
       this.drawDamper(pen, upper, lower, this.at(damper.force), text);
     }
   }

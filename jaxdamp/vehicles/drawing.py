@@ -39,36 +39,42 @@ class Drawing:
 
     Attributes:
         heights: of each point, as coefficients of the coordinates.
+        bodies: those drawn as such, in their order in `parts`.
+        springs: the links drawn as springs, in their order in `parts`.
         forces: the channel of the force of each damper.
         parts: what the script draws. A negative end of a damper, -1 - k, is the wheel k.
     """
 
     def __init__(self, frame: Frame, channels: Sequence[str]) -> None:
-        self._frame, self._known, self._drawn = frame, set(channels), list[_End]()
+        self.frame, self._known, self._drawn = frame, set(channels), list[_End]()
         links = [(link, self._ends(link.extension)) for link in frame.links]
         wheels = [(wheel, self._ends(wheel.point)[0]) for wheel in frame.wheels]
         self._links, self._on_road = [ends for _, ends in links], {end.body for _, end in wheels}
         self.forces: list[str] = []
         dampers = [self._damper(link, *map(self._point, ends)) for link, ends in links if len(ends) == 2]
         dampers += [self._damper(wheel, self._point(end), -1 - k) for k, (wheel, end) in enumerate(wheels)]
-        springs = [[self._point(end) for end in ends] for ends in self._links if len(ends) == 2 and self._above(*ends)]
+        upright = [(link, ends) for link, ends in links if len(ends) == 2 and self._above(*ends)]
+        self.springs = [link for link, _ in upright]
         on_road = [{"point": self._point(end)} for _, end in wheels]
-        bodies = [body.name for body in frame.bodies]
-        corners = [{"corners": self._corners(b), "level": self._levels[b]} for b in bodies if self._levels[b] > 0]
+        self.bodies = [body for body in frame.bodies if self._levels[body.name] > 0]
         self.parts: Contents = {
             "dampers": [damper for of_one in dampers for damper in of_one],
-            "springs": springs,
+            "springs": [[self._point(end) for end in ends] for _, ends in upright],
             "wheels": on_road,
-            "bodies": corners,
-            "beams": [self._of_body(body) for body in bodies if self._levels[body] == 0],
+            "bodies": [{"corners": self._corners(b.name), "level": self._levels[b.name]} for b in self.bodies],
+            "beams": [self._of_body(b.name) for b in frame.bodies if self._levels[b.name] == 0],
             "points": [self._place(end) for end in self._drawn],
         }
         self.heights = [Point(self._terms(end)) for end in self._drawn]
 
+    def body_of(self, point: int) -> str:
+        """The body on which a point is."""
+        return self._drawn[point].body
+
     def _ends(self, point: Point) -> list[_End]:
         """The ends of a link, or the bodies behind a point, those with a positive share first."""
         ends = []
-        for body in self._frame.bodies:
+        for body in self.frame.bodies:
             share = float(point.terms.get(f"z_{body.name}", 0.0))
             if share:
                 turns = {turn.axis: float(point.terms.get(body.angle(turn.axis), 0.0)) / share for turn in body.turns}
@@ -78,8 +84,8 @@ class Drawing:
     @cached_property
     def _offsets(self) -> Mapping[str, tuple[float, float]]:
         """Where the centre of gravity of each body is, ahead and to the left of that of the main body [m]."""
-        offsets = {self._frame.main_body.name: (0.0, 0.0)}
-        for _ in self._frame.bodies:
+        offsets = {self.frame.main_body.name: (0.0, 0.0)}
+        for _ in self.frame.bodies:
             for ends in self._links:
                 known = next((end for end in ends if end.body in offsets), None)
                 if known is None:
@@ -87,16 +93,17 @@ class Drawing:
                 ahead, left = offsets[known.body]
                 for end in ends:
                     offsets.setdefault(end.body, (ahead + known.ahead - end.ahead, left + known.left - end.left))
-        return {body.name: offsets.get(body.name, (0.0, 0.0)) for body in self._frame.bodies}
+        return {body.name: offsets.get(body.name, (0.0, 0.0)) for body in self.frame.bodies}
 
     @cached_property
     def _levels(self) -> Mapping[str, int]:
-        """How high a body is drawn: 0 a wheel, 1 the main body, 2 what stands on it."""
-        main, bodies = self._frame.main_body.name, [body.name for body in self._frame.bodies]
-        levels = {body: 0 if body in self._on_road and body != main else 1 for body in bodies}
-        for ends in self._links:
-            if len(ends) == 2 and ends[1].body == main:
-                levels[ends[0].body] = 2
+        """How high a body is drawn: 0 a wheel, 1 the main body, 2 what stands on it, and so on."""
+        main = self.frame.main_body.name
+        levels = {body.name: 0 if body.name in self._on_road - {main} else 1 for body in self.frame.bodies}
+        for _ in self.frame.bodies:
+            for upper, lower in (ends for ends in self._links if len(ends) == 2):
+                if upper.body not in self._on_road | {main} and lower.body != upper.body:
+                    levels[upper.body] = max(levels[upper.body], 1 + levels[lower.body])
         return levels
 
     def _point(self, end: _End) -> int:
@@ -111,7 +118,7 @@ class Drawing:
 
     def _terms(self, end: _End) -> dict[str, float]:
         arms = {"pitch": end.ahead, "roll": end.left}
-        body = self._frame.body(end.body)
+        body = self.frame.body(end.body)
         return {f"z_{end.body}": 1.0} | {body.angle(turn.axis): arms[turn.axis] for turn in body.turns}
 
     def _damper(self, part: Link | Wheel, upper: int, lower: int) -> list[Contents]:
