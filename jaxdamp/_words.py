@@ -67,8 +67,16 @@ def typeset(text: str) -> str:
     >>> typeset("-0.3 m/s^1.75")
     '−0.3 m/s¹·⁷⁵'
     """
-    text = re.sub(r"\^(-?[\d.]*\d)", lambda power: power[1].translate(_RAISED), text)
-    return re.sub(r"(?<![\w])-(?=\d)", "−", text)
+    return re.sub(r"(?<![\w])-(?=\d)", "−", raised(text))
+
+
+def raised(text: str) -> str:
+    """A text with raised powers.
+
+    >>> raised("-0.3 m/s^1.75")
+    '-0.3 m/s¹·⁷⁵'
+    """
+    return re.sub(r"\^(-?[\d.]*\d)", lambda power: power[1].translate(_RAISED), text)
 
 
 # Of the library: lower case, with no digits but those of a preset (half_car_002); no file or record, nothing in a call.
@@ -86,7 +94,9 @@ def said(text: str) -> str:
     text = re.sub(r"\biso:([A-H])\b", r"ISO class \1", text)
     text = re.sub(r"\bbump:([\d.]+):([\d.]+)", lambda at: f"a bump of {1e3 * float(at[1]):g} mm × {at[2]} m", text)
     text = _NAME.sub(lambda match: path_words(match[0]), text)
-    return typeset(text.replace("->", "→").replace("**", "·").replace("`", ""))
+    for plain, printed in (("->", "→"), ("<=", "≤"), (">=", "≥"), ("**", "·"), ("`", "")):
+        text = text.replace(plain, printed)
+    return typeset(text)
 
 
 def first_upper(words: str) -> str:

@@ -41,11 +41,11 @@ def bench_command(
     with job(screen, "bench", output) as work:
         with screen.stage("Reading the records"):
             raw = reading.raw(files)
-        screen.table(records_table(tuple(raw)))
+        screen.details(records_table(tuple(raw)))
         sound, found = reading.checked(screen, raw)
         runs = reading.processed(sound)
         remarks = decisions(runs)
-        screen.points(remarks)
+        screen.decided(remarks)
         by = None if group_by is None else value_of(tuple(raw), group_by)
         with screen.stage("Evaluating the records"):
             evaluation = bench.evaluate(runs, **how.arguments(by=by))

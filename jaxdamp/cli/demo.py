@@ -122,7 +122,7 @@ def run_demo(screen: Screen, scenario: Scenario, output: Output) -> None:
         _save_rides(work, rides, tuned, fits)
         work.page(_page, scenario, runs, held, fits, truth, rides, tuned)
         target = work.results.target
-    screen.table(screen.times_table())
+    screen.details(screen.times_table())
     screen.say(f"Open {target / 'report.html'}. The records are files like those of a real bench; fit them yourself:")
     screen.say(f'  jaxdamp fit {target / "records"} --held-out "{scenario.held_out}" --sign rebound-positive', "bold")
 
@@ -221,7 +221,7 @@ def show_fits(screen: Screen, fits: Fitted, truth: FitResult | None, scenario: S
     """The ladder and the recovered parameters."""
     show(screen, fits)
     if truth is not None:
-        screen.table(truth_table(scenario, truth))
+        screen.details(truth_table(scenario, truth))
         screen.say(truth_verdict(scenario, truth))
 
 
@@ -247,11 +247,11 @@ def show_tuning(screen: Screen, tuned: TuneResult, scenario: Scenario) -> None:
     screen.say(purpose(scenario.tyre_load))
     screen.say(tuned.verdict.sentence)
     screen.table(tuned.parameter_table())
-    screen.table(tuned.table())
+    screen.details(tuned.table())
     screen.say(outcome(tuned))
     screen.points(tuned.warnings, style="yellow")
     if tuned.fresh is not None:
-        screen.table(tuned.fresh.table())
+        screen.details(tuned.fresh.table())
 
 
 # ---- what is written

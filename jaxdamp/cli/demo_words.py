@@ -61,7 +61,7 @@ def _off(error: float) -> str:
 def show_rides(screen: Screen, rides: Mapping[str, Mapping[str, Response]]) -> None:
     """Ride metrics on each road."""
     for title, responses in rides.items():
-        screen.table(ride_table(title, responses))
+        screen.details(ride_table(title, responses))
         screen.say(ride_verdict(responses))
         screen.points(notes_of(responses), style="yellow")
 

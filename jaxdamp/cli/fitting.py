@@ -99,8 +99,9 @@ def fit(
         groups, divided = grouped(runs, group_by)
         _check_groups(groups, held, None if report is None else f"{report}", divided)
         remarks = [*decisions(runs), *filter(None, [divided])]
-        screen.table(records_table(tuple(runs), tuple(held)))
-        screen.points(remarks)
+        screen.details(records_table(tuple(runs), tuple(held)))
+        screen.decided(decisions(runs))
+        screen.points([divided] * bool(divided))
         options["keep_bad"] = reading.keep_bad
         options["scheduled"] = group_by is None and len({run.command for run in runs}) > 1
         if options["scheduled"] and cross_validate:
@@ -238,7 +239,7 @@ def fit_laws(
                 outcomes.append(outcome)
                 if isinstance(outcome, Rung):
                     interrupt.keep()
-                    screen.points([f"{outcome.name}: RMSE {outcome.error:.4g} N"])
+                    screen.points([f"{outcome.name}: RMSE {outcome.error:.4g} N"] * screen.verbose)  # the table has it
         except Interrupted:
             if not any(isinstance(outcome, Rung) for outcome in outcomes):
                 raise

@@ -17,6 +17,7 @@ from jaxdamp.roads import assess_roughness, class_limits, road_class
 
 
 _MM, _BINS, _MOST_BARS = 1e3, 31, 6
+_NOTE: _style.Look = {"fontsize": 6.5, "va": "center", "bbox": {"facecolor": "white", "linewidth": 0.0, "pad": 0.4}}
 
 
 def vehicle(axes: Axes, shown: _rides.Rides) -> None:
@@ -147,7 +148,7 @@ def _bar(axes: Axes, shown: _rides.Rides, row: int, name: str) -> None:
         axes.plot([end, end], [row - 0.15, row + 0.35], color=_style.BAD, linewidth=2.0, zorder=4)
     values = " → ".join(_style.quantity(value, shown.units[name]) for value in (before, after))
     text = f"{_style.metric_words(name)}:  {values}, {_style.percent(change)}"
-    axes.text(0.01, row - 0.3, text, transform=axes.get_yaxis_transform(), fontsize=6.5, va="center", zorder=5)
+    axes.text(0.01, row - 0.3, text, transform=axes.get_yaxis_transform(), zorder=5, **_NOTE)
 
 
 def damper(panels: Sequence[Axes], shown: _rides.Rides, path: str) -> None:

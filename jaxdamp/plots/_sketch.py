@@ -23,19 +23,23 @@ def sketch(axes: Axes, vehicle: AbstractVehicle) -> None:
     drawing = Drawing(vehicle.frame(), list(vehicle.units))
     points, parts = drawing.parts["points"], drawing.parts
     ahead = np.array([point["ahead"] for point in points])
-    x = np.interp(ahead, (ahead.min(), ahead.max()), _ENDS)
-    y = np.array([0.1 + _LEVEL * point["level"] if point["level"] else _WHEEL for point in points])
+    x = list(map(float, np.interp(ahead, (ahead.min(), ahead.max()), _ENDS)))
+    y = [0.1 + _LEVEL * point["level"] if point["level"] else _WHEEL for point in points]
     _sheet.blank(axes)
-    axes.set_ylim(0.0, y.max() + _THICK)
+    axes.set_ylim(0.0, max(y) + _THICK)
     for body, drawn in zip(drawing.bodies, parts["bodies"], strict=True):
-        (right, left), bottom = x[drawn["corners"][:2]], y[drawn["corners"][0]]
+        right, left, bottom = x[drawn["corners"][0]], x[drawn["corners"][1]], y[drawn["corners"][0]]
         axes.add_patch(Rectangle((left, bottom), right - left, _THICK, facecolor="0.92", edgecolor=_style.BLACK))
         name = f"{_style.in_words(body.name).replace('sprung', 'body')}, {_style.short(float(body.mass))} kg"
         axes.text(0.5 * (left + right), bottom + 0.5 * _THICK, name, ha="center", **_SMALL)
     near = [point["left"] >= 0.0 for point in points]
     for beam in parts["beams"]:
-        axes.plot(x[beam], y[beam], color=_style.BLACK, linewidth=2.5 if len(beam) > 1 else 0.0)
-    foot = y + _THICK * np.array([point["level"] > 0 for point in points])  # of what stands on a body
+        axes.plot(
+            [x[k] for k in beam], [y[k] for k in beam], color=_style.BLACK, linewidth=2.5 if len(beam) > 1 else 0.0
+        )
+    foot = [
+        high + _THICK * (point["level"] > 0) for high, point in zip(y, points, strict=True)
+    ]  # of what stands on a body
     springs = []
     for link, (upper, lower) in zip(drawing.springs, parts["springs"], strict=True):
         if near[upper] and float(link.stiffness):
@@ -65,7 +69,7 @@ def _damper(axes: Axes, x: float, low: float, high: float) -> None:
     axes.plot([x + _BESIDE] * 2, [low + third, high - third], color=blue, linewidth=6.0, solid_capstyle="butt")
 
 
-def _wheels(axes: Axes, drawing: Drawing, x: np.ndarray, y: np.ndarray, near: Sequence[bool]) -> None:
+def _wheels(axes: Axes, drawing: Drawing, x: Sequence[float], y: Sequence[float], near: Sequence[bool]) -> None:
     """Wheels on the road; what is equal in neighbours is written once, with the foremost one."""
     masses = {body.name: float(body.mass) for body in drawing.frame.bodies if body not in drawing.bodies}
     rates = [float(wheel.stiffness) for wheel in drawing.frame.wheels]
