@@ -18,36 +18,24 @@ _SMALL: _style.Look = {"fontsize": 6.5, "va": "center", "linespacing": 1.1}
 
 def sketch(axes: Axes, vehicle: AbstractVehicle) -> None:
     """Bodies on springs and dampers on wheels, front to the right, with masses and rates; of two sides the left one."""
-    from matplotlib.patches import Rectangle
-
     drawing = Drawing(vehicle.frame(), list(vehicle.units))
     points, parts = drawing.parts["points"], drawing.parts
     ahead = np.array([point["ahead"] for point in points])
     x = list(map(float, np.interp(ahead, (ahead.min(), ahead.max()), _ENDS)))
     y = [0.1 + _LEVEL * point["level"] if point["level"] else _WHEEL for point in points]
+    near = [point["left"] >= 0.0 for point in points]
+    foot = [high + _THICK * (point["level"] > 0) for high, point in zip(y, points, strict=True)]  # on bodies
     _sheet.blank(axes)
     axes.set_ylim(0.0, max(y) + _THICK)
-    for body, drawn in zip(drawing.bodies, parts["bodies"], strict=True):
-        right, left, bottom = x[drawn["corners"][0]], x[drawn["corners"][1]], y[drawn["corners"][0]]
-        axes.add_patch(Rectangle((left, bottom), right - left, _THICK, facecolor="0.92", edgecolor=_style.BLACK))
-        name = f"{_style.in_words(body.name).replace('sprung', 'body')}, {_style.short(float(body.mass))} kg"
-        axes.text(0.5 * (left + right), bottom + 0.5 * _THICK, name, ha="center", **_SMALL)
-    near = [point["left"] >= 0.0 for point in points]
-    for beam in parts["beams"]:
-        axes.plot(
-            [x[k] for k in beam], [y[k] for k in beam], color=_style.BLACK, linewidth=2.5 if len(beam) > 1 else 0.0
-        )
-    foot = [
-        high + _THICK * (point["level"] > 0) for high, point in zip(y, points, strict=True)
-    ]  # of what stands on a body
-    springs = []
-    for link, (upper, lower) in zip(drawing.springs, parts["springs"], strict=True):
-        if near[upper] and float(link.stiffness):
-            rate = f"{_style.short(1e-3 * float(link.stiffness))} N/mm"
-            springs.append((y[upper], x[upper], foot[lower], rate))
-    for (high, rate), same in groupby(sorted(springs), key=lambda one: (one[0], one[3])):
-        *others, (_, foremost, low, _) = same
-        for _, place, of_it, _ in others:
+    _bodies(axes, drawing, x, y)
+    springs = [
+        (y[upper], f"{_style.short(1e-3 * float(link.stiffness))} N/mm", x[upper], foot[lower])
+        for link, (upper, lower) in zip(drawing.springs, parts["springs"], strict=True)
+        if near[upper] and float(link.stiffness)
+    ]
+    for (high, rate), same in groupby(sorted(springs), key=lambda one: one[:2]):
+        *others, (_, _, foremost, low) = same
+        for _, _, place, of_it in others:
             _spring(axes, place, of_it, high, "")
         _spring(axes, foremost, low, high, "each " * bool(others) + rate)
     _wheels(axes, drawing, x, y, near)
@@ -57,9 +45,22 @@ def sketch(axes: Axes, vehicle: AbstractVehicle) -> None:
             _damper(axes, x[upper], _WHEEL if lower < 0 else foot[lower], y[upper])
 
 
+def _bodies(axes: Axes, drawing: Drawing, x: Sequence[float], y: Sequence[float]) -> None:
+    """Bodies with their masses, and beams between wheels."""
+    from matplotlib.patches import Rectangle
+
+    for body, drawn in zip(drawing.bodies, drawing.parts["bodies"], strict=True):
+        right, left, bottom = x[drawn["corners"][0]], x[drawn["corners"][1]], y[drawn["corners"][0]]
+        axes.add_patch(Rectangle((left, bottom), right - left, _THICK, facecolor="0.92", edgecolor=_style.BLACK))
+        name = f"{_style.in_words(body.name).replace('sprung', 'body')}, {_style.short(float(body.mass))} kg"
+        axes.text(0.5 * (left + right), bottom + 0.5 * _THICK, name, ha="center", **_SMALL)
+    for beam in drawing.parts["beams"]:
+        axes.plot([x[k] for k in beam], [y[k] for k in beam], color=_style.BLACK, linewidth=2.5)
+
+
 def _spring(axes: Axes, x: float, low: float, high: float, rate: str) -> None:
     turns = x - _BESIDE + 0.012 * np.array([0, 0, 1, -1, 1, -1, 1, 0, 0])
-    axes.plot(turns, np.linspace(low, high, 9), color=_style.BLACK, linewidth=1.0)
+    axes.plot(turns, np.linspace(low, high, 9), color=_style.BLACK, linewidth=1.0, zorder=1.5)
     axes.text(x + _BESIDE + 0.02, low + 0.62 * (high - low), rate, ha="left", **_SMALL)
 
 

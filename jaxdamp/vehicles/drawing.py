@@ -47,25 +47,35 @@ class Drawing:
 
     def __init__(self, frame: Frame, channels: Sequence[str]) -> None:
         self.frame, self._known, self._drawn = frame, set(channels), list[_End]()
-        links = [(link, self._ends(link.extension)) for link in frame.links]
-        wheels = [(wheel, self._ends(wheel.point)[0]) for wheel in frame.wheels]
-        self._links, self._on_road = [ends for _, ends in links], {end.body for _, end in wheels}
         self.forces: list[str] = []
-        dampers = [self._damper(link, *map(self._point, ends)) for link, ends in links if len(ends) == 2]
-        dampers += [self._damper(wheel, self._point(end), -1 - k) for k, (wheel, end) in enumerate(wheels)]
-        upright = [(link, ends) for link, ends in links if len(ends) == 2 and self._above(*ends)]
-        self.springs = [link for link, _ in upright]
-        on_road = [{"point": self._point(end)} for _, end in wheels]
+        self._links = [self._ends(link.extension) for link in frame.links]
+        wheels = [self._ends(wheel.point)[0] for wheel in frame.wheels]
+        self._on_road = {end.body for end in wheels}
+        pairs = self._pairs()
+        upright = [(link, upper, lower) for link, upper, lower in pairs if self._above(upper, lower)]
+        self.springs = [link for link, *_ in upright]
         self.bodies = [body for body in frame.bodies if self._levels[body.name] > 0]
         self.parts: Contents = {
-            "dampers": [damper for of_one in dampers for damper in of_one],
-            "springs": [[self._point(end) for end in ends] for _, ends in upright],
-            "wheels": on_road,
-            "bodies": [{"corners": self._corners(b.name), "level": self._levels[b.name]} for b in self.bodies],
-            "beams": [self._of_body(b.name) for b in frame.bodies if self._levels[b.name] == 0],
-            "points": [self._place(end) for end in self._drawn],
+            "dampers": self._dampers(pairs, wheels),
+            "springs": [[self._point(upper), self._point(lower)] for _, upper, lower in upright],
+            "wheels": [{"point": self._point(end)} for end in wheels],
+            **self._drawn_bodies(),
         }
+        self.parts["points"] = [self._place(end) for end in self._drawn]
         self.heights = [Point(self._terms(end)) for end in self._drawn]
+
+    def _pairs(self) -> list[tuple[Link, _End, _End]]:
+        """The links between two bodies, with their upper and lower ends."""
+        known = zip(self.frame.links, self._links, strict=True)
+        return [(link, ends[0], ends[1]) for link, ends in known if len(ends) == 2]
+
+    def _drawn_bodies(self) -> Contents:
+        """The bodies by their corners, and beams that carry wheels by their points."""
+        beams = [body.name for body in self.frame.bodies if self._levels[body.name] == 0]
+        return {
+            "bodies": [{"corners": self._corners(b.name), "level": self._levels[b.name]} for b in self.bodies],
+            "beams": [self._of_body(beam) for beam in beams],
+        }
 
     def body_of(self, point: int) -> str:
         """The body on which a point is."""
@@ -120,6 +130,13 @@ class Drawing:
         arms = {"pitch": end.ahead, "roll": end.left}
         body = self.frame.body(end.body)
         return {f"z_{end.body}": 1.0} | {body.angle(turn.axis): arms[turn.axis] for turn in body.turns}
+
+    def _dampers(self, pairs: Sequence[tuple[Link, _End, _End]], wheels: Sequence[_End]) -> list[Contents]:
+        """The dampers of links, and of hulls whose wheels have no mass those beside the tyre."""
+        dampers = [self._damper(link, self._point(upper), self._point(lower)) for link, upper, lower in pairs]
+        for number, (wheel, end) in enumerate(zip(self.frame.wheels, wheels, strict=True)):
+            dampers.append(self._damper(wheel, self._point(end), -1 - number))
+        return [damper for of_one in dampers for damper in of_one]
 
     def _damper(self, part: Link | Wheel, upper: int, lower: int) -> list[Contents]:
         """The elements of a part with a force, between two points."""
