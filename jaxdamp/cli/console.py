@@ -138,8 +138,8 @@ class Screen:
 
 
 def _printed(text: str, style: str = "") -> Text:
-    """A sentence in the reader's words, units and signs, with raised powers."""
-    return literal(raised(display().words(text)), style)
+    """A sentence in the reader's words, units and signs, with raised powers and arrows."""
+    return literal(raised(display().words(text)).replace(" -> ", " → "), style)
 
 
 def literal(text: str, style: str = "") -> Text:
