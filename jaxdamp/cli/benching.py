@@ -45,7 +45,7 @@ def bench_command(
         sound, found = reading.checked(screen, raw)
         runs = reading.processed(sound)
         remarks = decisions(runs)
-        screen.decided(remarks)
+        screen.points(remarks)
         by = None if group_by is None else value_of(tuple(raw), group_by)
         with screen.stage("Evaluating the records"):
             evaluation = bench.evaluate(runs, **how.arguments(by=by))

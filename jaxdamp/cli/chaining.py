@@ -63,7 +63,7 @@ def report(
             raise ValueError(f"A report is on one setting of a damper: name the records of one. {divided}")
         remarks = decisions(runs)
         screen.details(records_table(tuple(runs)))
-        screen.decided(remarks)
+        screen.points(remarks)
         car = make(None)
         fits = fit_laws(screen, names, runs, BenchSet(), keep_bad=reading.keep_bad)
         show(screen, fits)

@@ -18,7 +18,7 @@ from rich.text import Text
 
 from jaxdamp._display import display
 from jaxdamp._tables import Column, Table
-from jaxdamp._words import raised
+from jaxdamp._words import first_upper, raised
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.wording import message
 
@@ -54,7 +54,7 @@ class Screen:
     def answer(self, *sentences: str) -> None:
         """What the command was asked for, in words."""
         self.console.print()
-        self.say(" ".join(filter(None, sentences)), "bold")
+        self.say(" ".join(s if "_" in s.split(" ")[0] else first_upper(s) for s in sentences if s), "bold")
 
     def points(self, items: Sequence[str], style: str = "") -> None:
         """A list of remarks."""
@@ -62,10 +62,6 @@ class Screen:
             lines = _printed(item, style).wrap(self.console, max(self.console.width - 4, 20))
             for number, line in enumerate(lines):
                 self.console.print(Text("    " if number else "  - ", style).append_text(line), soft_wrap=True)
-
-    def decided(self, items: Sequence[str]) -> None:
-        """What was decided on reading: what an option would change and what is left out, with `verbose` all."""
-        self.points([item for item in items if self.verbose or " --" in item or item.startswith("left out")])
 
     def remarks(self, items: Sequence[str], style: str = "") -> None:
         """The first remarks of a list that is sorted by consequence, and how many more are on the page."""

@@ -100,8 +100,7 @@ def fit(
         _check_groups(groups, held, None if report is None else f"{report}", divided)
         remarks = [*decisions(runs), *filter(None, [divided])]
         screen.details(records_table(tuple(runs), tuple(held)))
-        screen.decided(decisions(runs))
-        screen.points([divided] * bool(divided))
+        screen.points(remarks)
         options["keep_bad"] = reading.keep_bad
         options["scheduled"] = group_by is None and len({run.command for run in runs}) > 1
         if options["scheduled"] and cross_validate:

@@ -64,7 +64,7 @@ def fit_vehicle(
         remarks = [f"{ride.name}: {note}" for ride in rides for note in ride.notes]
         remarks += [f"bench of {path}: {note}" for path, runs in benches.items() for note in decisions(tuple(runs))]
         screen.details(ride_records_table(rides))
-        screen.decided(remarks)
+        screen.points(remarks)
         guided, call = fit_arguments(car, rides, benches, how, guide)
         comparison = _compared(screen, guided, forms, rides, call) if forms else None
         result = comparison.best.result if comparison else _fitted(screen, guided, rides, call)

@@ -97,16 +97,6 @@ def test_the_terminal_has_the_first_remarks_and_says_how_many_are_left() -> None
     assert "- e" in out.getvalue() and "All" in out.getvalue()
 
 
-def test_of_what_the_reader_decided_the_terminal_has_what_an_option_changes(capsys: Any) -> None:
-    notes = ["velocity as measured", "taken as rebound: else pass --sign compression-positive", "left out: b.csv"]
-    screen = Screen()
-    screen.decided(notes)
-    assert capsys.readouterr().out.splitlines() == [f"  - {note}" for note in notes[1:]]
-    screen.verbose = True
-    screen.decided(notes)
-    assert capsys.readouterr().out.splitlines() == [f"  - {note}" for note in notes]
-
-
 def test_lines_are_as_wide_as_columns_say_and_hang_below_their_first_word(
     monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:
