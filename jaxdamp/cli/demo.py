@@ -110,7 +110,7 @@ def run_demo(screen: Screen, scenario: Scenario, output: Output) -> None:
         held = runs.select(scenario.held_out)
         fits = fit_laws(screen, scenario.laws, runs.without(scenario.held_out), held)
         truth = next((rung.result for rung in fits.comparison.rungs if rung.name == scenario.true_name), None)
-        show_fits(screen, fits, truth, scenario)
+        show(screen, fits)
         with work.saving("Laws and tables", f"the rides, the tuning, {fits.missing}") as draft:
             write_fits(draft, fits.comparison, runs, work.attempts)
             _write_truth(draft, truth, scenario, work.attempts)
@@ -119,6 +119,8 @@ def run_demo(screen: Screen, scenario: Scenario, output: Output) -> None:
         tuned = None if truth is None else improve(screen, truth, scenario)
         if tuned is not None:
             show_tuning(screen, tuned, scenario)
+        if truth is not None:
+            show_truth(screen, truth, scenario)
         _save_rides(work, rides, tuned, fits)
         work.page(_page, scenario, runs, held, fits, truth, rides, tuned)
         target = work.results.target
@@ -217,12 +219,10 @@ def improve(screen: Screen, truth: FitResult, scenario: Scenario) -> TuneResult:
 # ---- what they say
 
 
-def show_fits(screen: Screen, fits: Fitted, truth: FitResult | None, scenario: Scenario) -> None:
-    """The ladder and the recovered parameters."""
-    show(screen, fits)
-    if truth is not None:
-        screen.details(truth_table(scenario, truth))
-        screen.say(truth_verdict(scenario, truth))
+def show_truth(screen: Screen, truth: FitResult, scenario: Scenario) -> None:
+    """The recovered parameters."""
+    screen.details(truth_table(scenario, truth))
+    screen.say(truth_verdict(scenario, truth))
 
 
 def truth_table(scenario: Scenario, result: FitResult) -> Table:
