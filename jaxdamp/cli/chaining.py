@@ -62,7 +62,7 @@ def report(
         if len(groups) > 1:
             raise ValueError(f"A report is on one setting of a damper: name the records of one. {divided}")
         remarks = decisions(runs)
-        screen.table(records_table(tuple(runs)))
+        screen.details(records_table(tuple(runs)))
         screen.points(remarks)
         car = make(None)
         fits = fit_laws(screen, names, runs, BenchSet(), keep_bad=reading.keep_bad)

@@ -93,14 +93,14 @@ def run_demo(screen: Screen, scenario: Scenario, output: Output) -> None:
         fits = fit_laws(screen, scenario.laws, runs.without(scenario.held_out), runs.select(scenario.held_out))
         show(screen, fits)
         truth = next((rung.result for rung in fits.comparison.rungs if rung.name == scenario.true_name), None)
-        if truth is not None:
-            screen.table(truth_table(scenario, truth))
-        screen.say(truth_verdict(scenario, truth))
         with work.saving("Laws and tables", f"the rides, the tuning, {fits.missing}") as draft:
             write_fits(draft, fits.comparison, runs, work.attempts)
             _write_truth(draft, truth, scenario, work.attempts)
         rides = _rides(screen, scenario, fits)
         result = None if truth is None else _tuned(screen, truth, scenario)
+        if truth is not None:
+            screen.details(truth_table(scenario, truth))
+        screen.say(truth_verdict(scenario, truth))
         with work.saving("Rides and tuning") as draft:
             for number, responses in enumerate(rides.values(), 1):
                 tables = {f"ride_{number}_{name}": table for name, table in ride_tables(responses).items()}
@@ -109,7 +109,7 @@ def run_demo(screen: Screen, scenario: Scenario, output: Output) -> None:
                 write_tuning(draft, result)
         work.page(_page, scenario, runs, fits, truth, rides, result)
         target = work.results.target
-    screen.table(screen.times_table())
+    screen.details(screen.times_table())
     screen.say(f"Open {target / 'report.html'}. The records are files like those of a real bench; fit them yourself:")
     screen.say(f'  jaxdamp fit {target / "records"} --held-out "{scenario.held_out}" --sign rebound-positive', "bold")
 

@@ -303,5 +303,5 @@ def _prices(task: DesignTask[V], ended: Ended, ends: Sequence[LimitEnd]) -> dict
 
 def _moved(limit: Limit, end: LimitEnd, to: float) -> str:
     """A limit with another end, in words."""
-    sign = "<=" if end.sign > 0 else ">="
+    sign = "≤" if end.sign > 0 else "≥"
     return f"{limit.name} {sign} {to:.4g} {typeset_unit(limit.unit)}".rstrip() + f" instead of {end.value:.4g}"
