@@ -196,7 +196,7 @@ def dress(axes: Axes, x: str, y: str, title: str = "", *, turns: bool = False) -
     """Labels, a light grid, and no frame above and to the right; ticks in the units and the sign that are shown.
 
     The numbers drawn are those of the library: where the labels name a unit that is shown otherwise, the ticks are
-    round numbers of the other unit, and an axis of the other sign runs the other way, as an ordinate that `turns` does.
+    round numbers of the other unit, and an axis of the other sign (an ordinate that `turns`) runs the other way.
     """
     _wrap(axes.set_xlabel(display().text(x)), axes)
     _wrap(axes.set_ylabel(display().text(y)), axes)
@@ -209,11 +209,17 @@ def dress(axes: Axes, x: str, y: str, title: str = "", *, turns: bool = False) -
     axes.spines[["top", "right"]].set_visible(False)
 
 
+def together(text: str) -> str:
+    """A sign in brackets stays with its word, (+ rebound), where a line is broken."""
+    return re.sub(r"(?<=\([+−]) ", "\N{NO-BREAK SPACE}", text)
+
+
 _SLACK = 0.35  # inch, by which a title or label may be longer than its axes
 
 
 def _wrap(text: "matplotlib.text.Text", axes: Axes) -> None:
     """Break a title or label where it is longer than its axes, as wide as these are when they are drawn."""
+    text.set_text(together(text.get_text()))
     text.set_wrap(True)
     vars(text)["_get_wrap_line_width"] = functools.partial(_longest, text, axes)  # by default the width of the figure
 
@@ -240,9 +246,8 @@ def few_ticks(axes: Axes, most: int) -> None:
     from matplotlib.ticker import MaxNLocator
 
     before = axes.xaxis.get_major_locator()
-    if not isinstance(before, MaxNLocator):
-        before = MaxNLocator()
-    before.set_params(steps=[1, 2, 2.5, 5, 10])
+    before = before if isinstance(before, MaxNLocator) else MaxNLocator()
+    before.set_params(steps=[1, 2, 2.5, 4, 5, 10])
 
     class Ticks(MaxNLocator):
         def tick_values(self, vmin: float, vmax: float) -> "Sequence[float]":
@@ -257,8 +262,7 @@ def _rescale(axis: "matplotlib.axis.Axis", label: str, turns: bool = False) -> N
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
     found = re.search(r"\[([^\[\]]+)\]", label)
-    signed = turns or (display().text(label) != label and "+" in label)
-    shown = display().of(found[1] if found else "", signed=signed)
+    shown = display().of(found[1] if found else "", signed=turns or "+" in display().text(label))
     if shown.factor == 1.0 or axis.get_scale() != "linear":
         return
 
@@ -267,7 +271,7 @@ def _rescale(axis: "matplotlib.axis.Axis", label: str, turns: bool = False) -> N
             ends = sorted((shown(vmin), shown(vmax)))
             return np.sort(np.asarray(super().tick_values(*ends)) / shown.factor)
 
-    axis.set_major_locator(Ticks(nbins="auto", steps=[1, 2, 2.5, 5, 10]))
+    axis.set_major_locator(Ticks(nbins="auto", steps=[1, 2, 2.5, 4, 5, 10]))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{round(shown(value), 9) + 0.0:g}".replace("-", "−")))
     if shown.factor < 0.0:
         axis.set_inverted(True)
