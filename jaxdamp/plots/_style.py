@@ -198,10 +198,10 @@ def dress(axes: Axes, x: str, y: str, title: str = "", *, turns: bool = False) -
     The numbers drawn are those of the library: where the labels name a unit that is shown otherwise, the ticks are
     round numbers of the other unit, and an axis of the other sign (an ordinate that `turns`) runs the other way.
     """
-    _wrap(axes.set_xlabel(display().text(x)), axes)
-    _wrap(axes.set_ylabel(display().text(y)), axes)
-    _rescale(axes.xaxis, x)
-    _rescale(axes.yaxis, y, turns)
+    for text in (axes.set_xlabel(display().text(x)), axes.set_ylabel(display().text(y))):
+        _wrap(text, axes)
+    for axis, label, turn in ((axes.xaxis, x, False), (axes.yaxis, y, turns)):
+        _rescale(axis, label, turn)
     if title:
         _wrap(axes.set_title(display().words(title), loc="left", fontsize="medium"), axes)
     axes.grid(True, color="0.9", linewidth=0.8)
@@ -245,8 +245,7 @@ def few_ticks(axes: Axes, most: int) -> None:
     """
     from matplotlib.ticker import MaxNLocator
 
-    before = axes.xaxis.get_major_locator()
-    before = before if isinstance(before, MaxNLocator) else MaxNLocator()
+    before: Any = axes.xaxis.get_major_locator()  # of a linear axis
     before.set_params(steps=[1, 2, 2.5, 4, 5, 10])
 
     class Ticks(MaxNLocator):
