@@ -54,9 +54,9 @@ def test_the_demo_goes_through_the_whole_chain(tmp_path: Path, capsys: pytest.Ca
     fresh = list(csv.DictReader((out / "tables" / "tuned_on_fresh_roads.csv").read_text(encoding="utf-8").splitlines()))
     (held,) = [row for row in fresh if row["metric"] == comfort["metric"]]
     assert float(held["largest [%]"]) < -5.0
-    assert len(list(out.glob("*.png"))) == 9
+    assert len(list(out.glob("*.png"))) == 10
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert page.count("data:image/png") == 9
+    assert page.count("data:image/png") == 10
     verdict = page.partition('<div class="verdict">')[2].partition("</div>")[0]
     assert "standard errors off" in verdict and "on 2 fresh roads" in verdict
     for said in (
