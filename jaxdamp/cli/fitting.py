@@ -238,7 +238,7 @@ def fit_laws(
                 outcomes.append(outcome)
                 if isinstance(outcome, Rung):
                     interrupt.keep()
-                    screen.points([f"{outcome.name}: RMSE {outcome.error:.4g} N"] * screen.verbose)  # the table has it
+                    screen.points([f"{outcome.name}: RMSE {outcome.error:.4g} N"])
         except Interrupted:
             if not any(isinstance(outcome, Rung) for outcome in outcomes):
                 raise

@@ -134,7 +134,7 @@ def test_what_the_machine_adds_is_fitted_and_shown(records: Path, tmp_path: Path
 
 def test_one_law_is_fitted_without_a_ladder(records: Path, tmp_path: Path) -> None:
     text = " ".join(jaxdamp("fit", records, "--law", "linear", "--out", tmp_path / "fit").output.split())
-    assert "Fitting 1 law to 3 records" in text and "Records (" not in text  # by --verbose
+    assert "Fitting 1 law to 3 records ... - linear: RMSE " in text and "Records (" not in text  # by --verbose
     assert "Error of linear, held-out fit" in text and "law of velocity alone" in text
     assert not (tmp_path / "fit" / "ladder.png").exists()
 
