@@ -46,7 +46,7 @@ class Kernel(NamedTuple):
 
 @functools.cache
 def compilers() -> tuple[Compiler, ...]:
-    """The run-time compilers of CUDA that are installed: that of `jax[cuda12]` or `jax[cuda13]`, of the system, others."""
+    """The run-time compilers of CUDA that are installed: those of JAX and of the system."""
     spec = util.find_spec("nvidia")
     folders = [Path(place) for place in (spec.submodule_search_locations or ())] if spec else []
     paths = [str(path) for folder in folders for path in sorted(folder.glob("*/lib/libnvrtc.so.*"))]
@@ -74,7 +74,9 @@ def compiler_for(architecture: int) -> Compiler:
         installed = ", ".join(f"{c.version[0]}.{c.version[1]} (up to sm_{max(c.architectures)})" for c in found)
         here = f"installed: {installed}" if installed else "none is installed"
         for_driver = f" and a driver of CUDA {driver[0]}.{driver[1]}" if driver else ""
-        raise NotImplementedError(f"No NVRTC, the compiler of CUDA, for sm_{architecture}{for_driver}: {here}. {INSTALL}")
+        raise NotImplementedError(
+            f"No NVRTC, the compiler of CUDA, for sm_{architecture}{for_driver}: {here}. {INSTALL}"
+        )
     return max(suiting, key=lambda c: c.version)
 
 
