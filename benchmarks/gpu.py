@@ -131,7 +131,7 @@ if __name__ == "__main__":
     if sys.argv[1:2] == ["--find"]:
         print(json.dumps([jax.default_backend()]))
     elif sys.argv[1:2] == ["--way"]:
-        for line in measured(*sys.argv[2:5], int(sys.argv[5])):
+        for line in measured(sys.argv[2], sys.argv[3], sys.argv[4], int(sys.argv[5])):
             print(json.dumps(line), flush=True)
     else:
         main()

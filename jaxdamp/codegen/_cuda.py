@@ -122,7 +122,7 @@ def launcher(images: list[bytes]) -> str:
 
 def on_gpu() -> bool:
     """Whether what is traced runs on a GPU: on the default device, or else that of JAX."""
-    device = jax.config.jax_default_device
+    device = jax.config.jax_default_device  # pyright: ignore[reportAttributeAccessIssue]
     if isinstance(device, jax.Device):
         return device.platform == "gpu"
     return (device or jax.default_backend()) in ("gpu", "cuda")

@@ -1,5 +1,6 @@
 """Loops over steps printed as C for many points side by side give the numbers of `jax.lax.scan`."""
 
+import ctypes
 import re
 from pathlib import Path
 from types import SimpleNamespace
@@ -143,7 +144,7 @@ def test_the_kernel_of_a_ride(monkeypatch, name):
 def usage(text, architecture):
     """Registers of a thread and bytes spilt."""
     report = _cuda.kernel(text, architecture).report
-    return [int(re.search(rf"{pattern}", report)[1]) for pattern in (r"Used (\d+) registers", r"(\d+) bytes spill s")]
+    return [int(re.findall(pattern, report)[0]) for pattern in (r"Used (\d+) registers", r"(\d+) bytes spill stores")]
 
 
 def test_the_kernel_for_a_device(monkeypatch):
@@ -165,7 +166,7 @@ def test_the_kernel_for_a_device(monkeypatch):
 
 def test_the_right_compiler_of_several(monkeypatch):
     def installed(*versions):
-        found = [_cuda.Compiler(None, (major, 0), frozenset(known)) for major, known in versions]
+        found = [_cuda.Compiler(ctypes.CDLL(None), (major, 0), frozenset(known)) for major, known in versions]
         monkeypatch.setattr(_cuda, "compilers", lambda: found)
 
     installed((12, [80, 90]), (13, [90, 100]), (11, [80]))
