@@ -7,7 +7,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, final
+from typing import final
 
 from jaxdamp import _checks
 from jaxdamp._files import FOLDER_SUFFIXES, natural_key
@@ -85,7 +85,7 @@ class DamperRecords(Mapping[str, tuple[BenchRun, ...]]):
         """The text that changes whenever the records of a damper change; empty if nothing was stated."""
         return self._dampers[name][1]
 
-    def process(self, **steps: Any) -> "DamperRecords":
+    def process(self, **steps: object) -> "DamperRecords":
         """The records with steps done, as by `BenchSet.process`, each time they are read.
 
         Arguments:
@@ -104,9 +104,10 @@ class DamperRecords(Mapping[str, tuple[BenchRun, ...]]):
         return DamperRecords(self._read, keys, names, stamps)
 
 
-def _processed(read: Callable[..., Any], steps: Mapping[str, Any], key: object) -> BenchSet:
+def _processed(read: Callable[..., object], steps: Mapping[str, object], key: object) -> BenchSet:
     """The records of a damper with steps done."""
-    return BenchSet(as_runs(read(key))).process(**steps)
+    process: Callable[..., BenchSet] = BenchSet(as_runs(read(key))).process
+    return process(**steps)
 
 
 def read_dampers(paths: str | os.PathLike[str], *, each: str, **options: object) -> DamperRecords:

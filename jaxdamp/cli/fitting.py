@@ -88,19 +88,19 @@ def fit(
             with the columns damper and file.
         in_control: so many dampers at the beginning were in control: limits of control charts of all, with --each.
     """
+    given = {"held_out": held_out, "group_by": group_by, "cross_validate": cross_validate, "baseline": baseline}
     if each is not None:
-        given = {"held_out": held_out, "group_by": group_by, "cross_validate": cross_validate, "baseline": baseline}
-        refused = [Refused(name, bool(value)) for name, value in (given | {"report": report, "resume": resume}).items()]
+        refused = _given(**given, report=report, resume=resume)
         options = _options(how, rig)
-        fit_line(screen, files, each, law, reading, options, output, in_control=in_control, refused=refused)
+        machine = options.pop("rig")
+        fit_line(screen, files, each, law, machine, reading, options, output, in_control=in_control, refused=refused)
         return
     if in_control is not None:
         _checks.refuse("in_control", "be given with --each", in_control, "Or leave it out.")
     table = reading.table(files)
     kind = None if table is None else through_points(law)
     if table is not None and kind is not None:
-        given = {"held_out": held_out, "group_by": group_by, "cross_validate": cross_validate, "baseline": baseline}
-        fit_table(screen, table, kind, output, [Refused(name, bool(value)) for name, value in given.items()])
+        fit_table(screen, table, kind, output, _given(**given))
         return
     names = law_names(law)
     options = _options(how, rig)
@@ -124,6 +124,11 @@ def fit(
             remedy = "Records at each inner command are predicted without them anyway; --group-by command fits apart."
             _checks.refuse("cross_validate", "be left out where the records state several commands", "given", remedy)
         Fits(work, names, options, found, remarks, cross_validate, beside).of_all(groups, held)
+
+
+def _given(**options: object) -> list[Refused]:
+    """Options that a kind of fit refuses if they are given."""
+    return [Refused(name, bool(value)) for name, value in options.items()]
 
 
 def _options(how: Call, rig: Sequence[str]) -> dict[str, Any]:

@@ -1,9 +1,8 @@
 """`jaxdamp fit --each`: one law fitted to every damper of a production line, and control charts of its numbers."""
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from jaxdamp import _checks, bench, identify
 from jaxdamp._checks import ArgumentError
@@ -28,8 +27,9 @@ def fit_line(
     files: Sequence[Path],
     each: str,
     law: Sequence[str],
+    rig: Sequence[str],
     reading: Reading,
-    options: Mapping[str, Any],
+    options: Mapping[str, object],
     output: Output,
     *,
     in_control: int | None,
@@ -42,14 +42,44 @@ def fit_line(
         files: a folder tree, or a table of files.
         each: what is a damper, as in `bench.read_dampers`.
         law: name of the law.
+        rig: what the test machine adds.
         reading: how the records are read and processed.
-        options: of the fits, with the machine as "rig".
+        options: of the fits.
         output: the folder to write; the fits are kept beside it, in a store of its name.
         in_control: so many dampers at the beginning give the limits of control charts; None for no charts.
         refused: options that say nothing of a line.
     """
-    further = [Refused(name, True) for name in options if name not in (*_TAKEN, "rig")]
-    for option in (*refused, *further):
+    name = _checked(files, law, [*refused, *(Refused(n, True) for n in options if n not in _TAKEN)])
+    dampers = bench.read_dampers(files[0], each=each, **reading.read.arguments()).process(**reading.processing())
+    if in_control is not None:
+        _charts({"place": range(len(dampers))}, in_control)  # refuses too few or too many before anything is fitted
+    out = output.out or Path("jaxdamp-fit")
+    with job(screen, "fit", output) as work:
+        with screen.stage("Reading the first damper"):
+            start = _start(dampers, name, rig)
+        bounds = options.get("bounds")
+        stated = bounds_in_si(bounds if isinstance(bounds, dict) else {}, [{"law": start, "rig": Rig()}])
+        how = {**options, "bounds": stated, "rig": rig}
+        skips = "leave_out" if reading.read.given.get("skip_bad") else "refuse"
+        how["bad_records"] = "keep" if reading.keep_bad else skips
+        title = f"Fitting {name} to {len(dampers)} dampers"
+        with screen.stage(title) as advance, warnings.catch_warnings(action="ignore"):  # of dampers, which are remarks
+            how["progress"] = lambda done, total: advance(f"{done} of {total}", done)
+            fitting: Callable[..., ManyFits] = identify.fit_many
+            many = fitting(start, dampers, file=out.with_name(f"{out.name}.zarr"), **how)
+        results = [many] if in_control is None else [many, _charts(many, in_control)]
+        screen.answer(*(f"{result.summary}." for result in results))
+        screen.remarks([text for result in results for text in result.warnings], style="yellow")
+        screen.details(many.table())
+        with work.saving("Tables") as draft:
+            more = results[-1].tables() if in_control is not None else {}
+            write_tables(draft / "tables", {"fits": many.table(), **more})
+        work.page(result_report, results[-1])
+
+
+def _checked(files: Sequence[Path], law: Sequence[str], refused: Sequence[Refused]) -> str:
+    """The name of the law; what a line does not take is refused."""
+    for option in refused:
         if option.given:
             _checks.refuse(option.name, "be left out where each damper is fitted", "given", "Leave out one of them.")
     names = law_names(law)
@@ -57,27 +87,7 @@ def fit_line(
         _checks.refuse("law", "be one law for all dampers", ", ".join(names) or "left out", 'See "jaxdamp laws".')
     if len(files) != 1:
         _checks.refuse("each", "be given with one folder or one table of files", f"given with {len(files)}")
-    dampers = bench.read_dampers(files[0], each=each, **reading.read.arguments()).process(**reading.processing())
-    if in_control is not None:
-        _charts({"place": range(len(dampers))}, in_control)  # refuses too few or too many before anything is fitted
-    out = output.out or Path("jaxdamp-fit")
-    with job(screen, "fit", output) as work:
-        with screen.stage("Reading the first damper"):
-            start = _start(dampers, names[0], options["rig"])
-        how = {**options, "bounds": bounds_in_si(options.get("bounds") or {}, [{"law": start, "rig": Rig()}])}
-        skips = "leave_out" if reading.read.given.get("skip_bad") else "refuse"
-        how["bad_records"] = "keep" if reading.keep_bad else skips
-        title = f"Fitting {names[0]} to {len(dampers)} dampers"
-        with screen.stage(title) as advance, warnings.catch_warnings(action="ignore"):  # of dampers, which are remarks
-            how["progress"] = lambda done, total: advance(f"{done} of {total}", done)
-            many = identify.fit_many(start, dampers, file=out.with_name(f"{out.name}.zarr"), **how)
-        charts = None if in_control is None else _charts(many, in_control)
-        screen.answer(*(f"{result.summary}." for result in (many, charts) if result is not None))
-        screen.remarks((*many.warnings, *(() if charts is None else charts.warnings)), style="yellow")
-        screen.details(many.table())
-        with work.saving("Tables") as draft:
-            write_tables(draft / "tables", {"fits": many.table(), **({} if charts is None else charts.tables())})
-        work.page(result_report, many if charts is None else charts)
+    return names[0]
 
 
 def _charts(numbers: ManyFits | Mapping[str, Sequence[float]], in_control: int) -> ControlCharts:
