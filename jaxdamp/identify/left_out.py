@@ -10,7 +10,7 @@ What tells causes apart:
 - the mains have a line, a clock that jitters scatters the force in proportion to its rate of change;
 - no law of the velocity has a force at rest, so that another curve with one is a constant force;
 - a fault of the machine explains all that repeats from cycle to cycle: if some of it is left, it is the law. A spring
-  in series is nearly a filter and a mass, so that the second of two such effects has to explain all that the first left.
+  in series is nearly a filter and a mass: the second of two such effects has to explain all that the first left.
 """
 
 from collections.abc import Sequence
