@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxdamp.bench import clock_jitter, mains_lines
+from jaxdamp.identify.model import is_memoryless
 from jaxdamp.identify.noise import correlation_time
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.residual_patterns import (
@@ -102,7 +103,8 @@ def left_out(problem: Problem, best: SearchEnd) -> list[str]:
     if (named and named[-1].effect.name in OF_LAW) or (
         not static and repeated > 0 and left > max(OF_THE_LAW * asked, sure)
     ):
-        return [*of_clock, _of_the_law(named, left / repeated if repeated > 0 else 1.0), *of_mains]
+        of_law = _of_the_law(named, left / repeated if repeated > 0 else 1.0, is_memoryless(problem.law))
+        return [*of_clock, of_law, *of_mains]
     looks = ((one.words.format("of the squared residual look"), one.effect.remedy) for one in named)
     return [*of_clock, *(f"{look}, which the fit leaves out: {remedy}." for look, remedy in looks), *of_mains]
 
@@ -118,12 +120,14 @@ def _percent(share: float) -> str:
     return f"{100 * share:.0f}" if share >= 0.01 else f"{100 * share:.1g}"
 
 
-def _of_the_law(named: Sequence[_Named], left: float) -> str:
+def _of_the_law(named: Sequence[_Named], left: float, memoryless: bool) -> str:
+    """A sentence on what the law misses; a law with memory is not told to become one without."""
     parts = [found.words.format("is") for found in named if found.effect.name not in OF_LAW]
     alike = f" (of the squared residual {', '.join(parts)})" * bool(parts)
     if named and named[-1].effect.name in OF_LAW:
         effect = named[-1].effect
-        return f"By the residual, the law misses {effect.words(named[-1].sizes)}{alike}: {effect.remedy}. {LAST_WORD}"
+        remedy = f": {effect.remedy}" * memoryless
+        return f"By the residual, the law misses {effect.words(named[-1].sizes)}{alike}{remedy}. {LAST_WORD}"
     return (
         f"The residual repeats from cycle to cycle, and {_percent(min(left, 1.0))} % of that is like no fault of a"
         f" machine{alike}: the law misses something of the damper. {LAST_WORD}"
