@@ -93,8 +93,7 @@ def left_out(problem: Problem, best: SearchEnd) -> list[str]:
     of_mains, residual, span = _mains(problem, records, residual, span)
     of_clock = _jitter(problem, records, squares)
     named = _search(problem, records, residual, span, squares, SCATTER if of_clock else 0.0)
-    before = _before_last_shift(named)
-    asked = repeated if before is None else _repeated(before, records)
+    asked = _to_explain(named, repeated, records)
     if named:
         residual = named[-1].rest
     left, alike = _repeated(residual, records), _alike(residual, records)
@@ -109,10 +108,10 @@ def left_out(problem: Problem, best: SearchEnd) -> list[str]:
     return [*of_clock, *(f"{look}, which the fit leaves out: {remedy}." for look, remedy in looks), *of_mains]
 
 
-def _before_last_shift(named: Sequence[_Named]) -> np.ndarray | None:
-    """The residual before the last of several effects that shift the phase; None if there are not several."""
+def _to_explain(named: Sequence[_Named], repeated: float, records: Sequence[Record]) -> float:
+    """What repeats that a machine has to explain: of several effects that shift the phase, that before the last."""
     shifts = [i for i, found in enumerate(named) if found.effect.name in OF_PHASE]
-    return named[shifts[-1] - 1].rest if len(shifts) > 1 else None
+    return _repeated(named[shifts[-1] - 1].rest, records) if len(shifts) > 1 else repeated
 
 
 def _percent(share: float) -> str:
