@@ -33,6 +33,8 @@ from jaxdamp.dampers import (
     SegmentedPolynomial,
     SeriesSpring,
     Spring,
+    StrokeScaled,
+    Thinned,
     ViscoPlastic,
 )
 from jaxdamp.identify.fitting import NUMERICAL
@@ -78,7 +80,18 @@ _MEMORYLESS = {
     "besinger": Besinger.guess,
     "linear_friction": _friction,
 }
-_BESIDE_SPRING = {"lugre_spring": LuGre.guess, "visco_plastic_spring": ViscoPlastic.guess}
+
+
+def _thinned(velocity: np.ndarray, force: np.ndarray) -> AbstractDamper:
+    """Half of the force is lost at the largest velocity, if it lasts a third of a second."""
+    return Thinned(StrokeScaled(ViscoPlastic.guess(velocity, force)), float(np.max(np.abs(velocity))), 0.3)
+
+
+_BESIDE_SPRING = {
+    "lugre_spring": LuGre.guess,
+    "visco_plastic_spring": ViscoPlastic.guess,
+    "thinned_visco_plastic_spring": _thinned,
+}
 LEARNT = "neural_hysteresis_spring"
 
 
@@ -114,6 +127,9 @@ NAMED_LAWS = {
     "besinger_play": NamedLaw(True, "besinger behind a clearance: worn joint, loose mount, void in the oil"),
     "series_spring_dahl": NamedLaw(True, "piecewise_linear in series with a spring, elastic friction, a spring"),
     "visco_plastic_spring": NamedLaw(True, "concave viscous force, two yielding elements, a spring"),
+    "thinned_visco_plastic_spring": NamedLaw(
+        True, "concave viscous force, two yielding elements, thinned by motion and scaled along the stroke, a spring"
+    ),
     "neural_hysteresis_spring": NamedLaw(
         True, "one coefficient, hysteresis learnt by a network, a spring; takes minutes, only by name", optional=True
     ),
@@ -190,7 +206,8 @@ def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS, *, rig
     `piecewise_linear`, `table`, `besinger` (paper 001), `linear_friction` (with smooth Coulomb friction). With
     hysteresis: `besinger_lag`, `besinger_series_spring` (paper 001), `linear_friction_lag`, and for friction with
     elastic deformation before sliding, as in magnetorheological dampers, `bouc_wen`, `lugre_spring` and
-    `visco_plastic_spring` (with a parallel spring). `besinger_play` has a clearance in series, and `series_spring_dahl`
+    `visco_plastic_spring` (with a parallel spring), and `thinned_visco_plastic_spring`, whose force also falls with
+    the recent speed and changes along the stroke. `besinger_play` has a clearance in series, and `series_spring_dahl`
     a piecewise-linear law behind a spring, beside friction and a spring. Only if it is named:
     `neural_hysteresis_spring`, trained on the records (`LearntStart`).
 
