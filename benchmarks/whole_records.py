@@ -25,7 +25,7 @@ CURRENTS = {"*_0A": 0.0, "*_0.5A": 0.5, "*_1.0A": 1.0}
 SEARCH = {"samples_per_cycle": 100, "max_steps": 30, "starts": 1}
 PARTS = ("moving", "whole", "estimated")
 CREEPING = "creeping_visco_plastic_spring"
-LAWS = ["lugre_spring", "visco_plastic_spring", "thinned_visco_plastic_spring", CREEPING]
+LAWS = ["lugre_spring", "visco_plastic_spring", "thinned_visco_plastic", CREEPING]
 
 
 def creeping(velocity: np.ndarray, force: np.ndarray, stroke: np.ndarray) -> dampers.AbstractDamper:

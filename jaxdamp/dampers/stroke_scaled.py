@@ -6,6 +6,7 @@ import jax.numpy as jnp
 
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers.contract import Traits
 from jaxdamp.dampers.fitted_range import Motion
 from jaxdamp.dampers.wrapper import AbstractWrapper
 from jaxdamp.parameters import parameter
@@ -39,6 +40,12 @@ class StrokeScaled(AbstractWrapper):
     def is_linear_in_law(self) -> bool:
         """A factor is linear."""
         return True
+
+    def traits(self) -> Traits:
+        """Those of the law inside; a force that it has at rest changes with the stroke, even if it is constant."""
+        inner = super().traits()
+        at_rest = inner.stroke_dependent_at_rest or inner.contains_offset
+        return inner._replace(stroke_dependent=True, stroke_dependent_at_rest=at_rest)
 
     def motion_inside(self, motion: Motion) -> list[tuple[AbstractDamper, Motion]]:
         """The same motion; the force inside is not known."""
