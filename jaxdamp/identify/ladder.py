@@ -128,7 +128,9 @@ NAMED_LAWS = {
     "series_spring_dahl": NamedLaw(True, "piecewise_linear in series with a spring, elastic friction, a spring"),
     "visco_plastic_spring": NamedLaw(True, "concave viscous force, two yielding elements, a spring"),
     "thinned_visco_plastic": NamedLaw(
-        True, "concave viscous force, two yielding elements, thinned by motion and scaled along the stroke, a spring"
+        True,
+        "visco_plastic_spring whose force falls in motion and changes along the stroke; only by name",
+        optional=True,
     ),
     "neural_hysteresis_spring": NamedLaw(
         True, "one coefficient, hysteresis learnt by a network, a spring; takes minutes, only by name", optional=True
@@ -207,9 +209,9 @@ def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS, *, rig
     `piecewise_linear`, `table`, `besinger` (paper 001), `linear_friction` (with smooth Coulomb friction). With
     hysteresis: `besinger_lag`, `besinger_series_spring` (paper 001), `linear_friction_lag`, and for friction with
     elastic deformation before sliding, as in magnetorheological dampers, `bouc_wen`, `lugre_spring` and
-    `visco_plastic_spring` (with a parallel spring), and `thinned_visco_plastic`, whose force also falls with
-    the recent speed and changes along the stroke. `besinger_play` has a clearance in series, and `series_spring_dahl`
-    a piecewise-linear law behind a spring, beside friction and a spring. Only if it is named:
+    `visco_plastic_spring` (with a parallel spring). `besinger_play` has a clearance in series, and `series_spring_dahl`
+    a piecewise-linear law behind a spring, beside friction and a spring. Only if they are named:
+    `thinned_visco_plastic`, whose force also falls with the recent speed and changes along the stroke, and
     `neural_hysteresis_spring`, trained on the records (`LearntStart`).
 
     If a start cannot be computed from these records, the entry is a function that raises the reason when a fit calls
