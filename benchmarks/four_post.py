@@ -13,18 +13,17 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from jaxdamp import configure
+import jax
+import numpy as np
+
+from benchmarks.vehicle_fits import distances, summarise
+from jaxdamp import bench, dampers, identify, roads, vehicles
+from jaxdamp.parameters import replace
+from jaxdamp.rig import Sensor
 
 
-configure()
-
-import numpy as np  # noqa: E402
-
-from benchmarks.vehicle_fits import distances, summarise  # noqa: E402
-from jaxdamp import bench, dampers, identify, roads, vehicles  # noqa: E402
-from jaxdamp.parameters import replace  # noqa: E402
-from jaxdamp.rig import Sensor  # noqa: E402
-
+if __name__ == "__main__":
+    jax.config.update("jax_enable_x64", True)
 
 TRAVEL, RATIO = [-0.08, 0.0, 0.08], [0.95, 0.85, 0.7]  # of the wheel [m], from the kinematics
 DURATION, RATE, FINER = 4.0, 500.0, 4  # s, Hz, steps of the simulation in a sampling interval
