@@ -12,6 +12,7 @@ import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import jax
 import numpy as np
@@ -36,8 +37,8 @@ SENSORS = {name: Sensor(offset=0.1 * (-1) ** k, lag=2e-3) for k, name in enumera
 SENSORS |= {name: Sensor(offset=1e-3 * (k + 1), delay=1e-3) for k, name in enumerate(STROKES)}
 REVERSED = "rear_left_stroke"
 KNOWN = ["sprung_mass", "*_distance", "*.track_width", "*.ratio"]  # from scales and a tape measure
-RIGHT = {"reversed_channels": [REVERSED]}
-WRONG = {
+RIGHT: dict[str, Any] = {"reversed_channels": [REVERSED]}
+WRONG: dict[str, dict[str, Any]] = {
     f"{REVERSED} with the sign of the file": {},
     "front_left_stroke in mm read as cm": {**RIGHT, "units": {"front_left_stroke": "cm"}},
     "sprung_acceleration in g read as m/s^2": {**RIGHT, "units": {"sprung_acceleration": "m/s^2"}},
@@ -105,13 +106,14 @@ def main() -> None:
     rows: list[dict[str, float]] = []
     with tempfile.TemporaryDirectory() as name:
         for seed in range(parser.parse_args().repeats):
-            begin, path = time.perf_counter(), file_of(ride(seed), Path(name))
-            result = fitted(bench.read_rides(path, **RIGHT))
+            begin = time.perf_counter()
+            result = fitted(bench.read_rides(file_of(ride(seed), Path(name)), **RIGHT))
             rows.append(distances(result, CAR, SENSORS))
             print(f"seed {seed}: {result.status}, {time.perf_counter() - begin:.1f} s", flush=True)
             if seed == 0:
                 print(result.table(CAR, sensors=SENSORS).to_text(), *result.warnings, sep="\n")
         summarise(rows)
+        path = file_of(ride(0), Path(name))
         for what, how in WRONG.items():
             wrong = fitted(bench.read_rides(path, **how))
             print(f"\n{what}: {wrong.status}", *wrong.warnings, sep="\n", flush=True)

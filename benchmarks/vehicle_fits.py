@@ -48,7 +48,7 @@ def fitted(seed: int) -> identify.VehicleFit:
 
 
 def distances(
-    result: identify.VehicleFit, vehicle: vehicles.AbstractVehicle, sensors: Mapping[str, Sensor]
+    result: identify.VehicleFit, vehicle: vehicles.AbstractVehicle, sensors: dict[str, Sensor]
 ) -> dict[str, float]:
     """(value − true)/standard error of every parameter."""
     return {str(row[0]): float(str(row[5])) for row in result.table(vehicle, sensors=sensors).rows}
