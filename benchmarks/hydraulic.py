@@ -1,20 +1,18 @@
-"""A hydraulic damper identified from a noisy bench: what is predicted, and how often 95 % intervals are right.
+"""A mono-tube damper identified from a noisy bench: what is predicted, and how often 95 % intervals are right.
 
 The virtual damper heats up, has a clearance in its joint and friction in its seal; the machine adds a moving mass, a
 delay and a zero error, and noise to the force. Every record begins at rest. The first fit starts from the records and
 the stated geometry. It is scored on records of other strokes and frequencies, beside laws of the ladder. Each repeat
 has noise and a zero error of its own and starts from the first result. Without the clearance a fit is several times as
-fast. The twin-tube is tested at two gas pressures, which its records state, and predicted at a third one too.
+fast.
 
-    python -m benchmarks.hydraulic [--tube mono|twin] [--repeats 40] [--laws besinger_play,series_spring_dahl]
-        [--without-clearance]
+    python -m benchmarks.hydraulic [--repeats 40] [--laws besinger_play,series_spring_dahl] [--without-clearance]
 """
 
 import argparse
 import dataclasses
 import time
 from collections.abc import Sequence
-from typing import Any, NamedTuple
 
 from jaxdamp import configure
 
@@ -24,7 +22,7 @@ configure()
 import numpy as np  # noqa: E402
 
 from jaxdamp.bench import BenchRun, SineTest, VirtualDyno  # noqa: E402
-from jaxdamp.dampers import AbstractDamper, Heated, Linear, MonoTube, Play, TwinTube  # noqa: E402
+from jaxdamp.dampers import AbstractDamper, Heated, Linear, MonoTube, Play  # noqa: E402
 from jaxdamp.identify import FitResult, default_ladder, fit, fit_percent, prepare  # noqa: E402
 from jaxdamp.identify.problem import linearised  # noqa: E402
 from jaxdamp.parameters import parameters, replace  # noqa: E402
@@ -32,88 +30,30 @@ from jaxdamp.rig import Rig  # noqa: E402
 
 
 ACROSS = Linear(20.0)  # N s/m, beside the damper: what a law in series with a clearance needs
+TUBE = replace(MonoTube.reference(), {"piston.leak": 1e-12})  # m³/s/Pa: 2 % of the flow where the rebound valve opens
+DAMPER = Heated(Play(TUBE + ACROSS, stiffness=4e6, clearance=1e-4), sensitivity=0.003, static_force_slope=-1.0)
+RIGID = Heated(TUBE + ACROSS, sensitivity=0.003, static_force_slope=-1.0)
 MACHINE = Rig(moving_mass=2.0, force_delay=5e-4)
+GEOMETRY = {
+    "piston_diameter": 2.0 * np.sqrt(1.52e-3 / np.pi),
+    "rod_diameter": 2.0 * np.sqrt(1e-4 / np.pi),
+    "rebound_volume": 1.1e-4,
+}
 NOISE, ZERO_ERROR = 10.0, 5.0  # N, standard deviations of a sample, and of the zero of a load cell that was zeroed
 CYCLES, SAMPLES = 12, 300  # of each record; samples of a cycle
 MOTIONS = [(0.03, 0.1), (0.025, 1.6), (0.025, 5.0), (0.006, 12.0)]  # m, Hz
 OTHERS = [(0.02, 0.5), (0.03, 2.5), (0.015, 6.0), (0.008, 8.0)]
-KNOWN = ["gas.rod_area", "exponent", "rate", "cooling_time", "initial_rise"]
+KNOWN = ["rod_area", "exponent", "rate", "cooling_time", "initial_rise"]
+HOW = {"freeze": KNOWN, "samples_per_cycle": None}
 PRIORS = {"force_offset": (0.0, ZERO_ERROR)}
 
 
-class Tube(NamedTuple):
-    """A damper on the bench.
-
-    Attributes:
-        law: the oil, the gas and the seal.
-        geometry: what the start is told.
-        known: numbers that the fits hold, beside `KNOWN`.
-        pressures: gas pressures of the records that are fitted, in bar; none if the records state none.
-        others: of those that are predicted.
-        speed: factor on the frequencies of the tests.
-    """
-
-    law: MonoTube | TwinTube
-    geometry: dict[str, float]
-    known: tuple[str, ...] = ()
-    pressures: tuple[float, ...] = ()
-    others: tuple[float, ...] = ()
-    speed: float = 1.0
-
-    @property
-    def how(self) -> dict[str, Any]:
-        """Arguments of the fits."""
-        return {"freeze": [*KNOWN, *self.known], "samples_per_cycle": None}
-
-    def damper(self, *, rigid: bool) -> AbstractDamper:
-        """The damper, which heats up, with a clearance in its joint unless it is rigid."""
-        inside = self.law + ACROSS
-        inside = inside if rigid else Play(inside, stiffness=4e6, clearance=1e-4)
-        return Heated(inside, sensitivity=0.003, static_force_slope=-1.0)
-
-    def start(self, runs: Sequence[BenchRun], *, rigid: bool) -> AbstractDamper:
-        """The tube from records and geometry, with rough values of heat and clearance."""
-        samples = (np.concatenate([getattr(r, c) for r in runs]) for c in ("velocity", "force", "stroke"))
-        inside = type(self.law).guess(*samples, **self.geometry) + ACROSS
-        inside = inside if rigid else Play(inside, stiffness=2e6, clearance=2e-4)
-        return Heated(inside, sensitivity=0.002)
-
-
-TUBES = {
-    "mono": Tube(
-        replace(MonoTube.reference(), {"piston.leak": 1e-12}),  # m³/s/Pa: 2 % of the flow where the rebound valve opens
-        {
-            "piston_diameter": 2.0 * np.sqrt(1.52e-3 / np.pi),
-            "rod_diameter": 2.0 * np.sqrt(1e-4 / np.pi),
-            "rebound_volume": 1.1e-4,
-        },
-    ),
-    "twin": Tube(
-        TwinTube.reference(),
-        {"piston_diameter": 0.05, "rod_diameter": 0.02, "rebound_volume": 3.3e-4, "compression_volume": 3.9e-4},
-        ("base.rebound_*",),
-        (3.0, 7.0),
-        (5.0, 9.0),
-        0.5,
-    ),
-}
-
-
-def records(
-    tube: Tube, motions: Sequence[tuple[float, float]], pressures: Sequence[float], *, rigid: bool
-) -> list[BenchRun]:
-    """Records without noise, at each pressure [bar]."""
+def records(damper: AbstractDamper, motions: Sequence[tuple[float, float]]) -> list[BenchRun]:
+    """Records without noise."""
     runs = []
-    for pressure in pressures or [None]:
-        damper, settings = tube.damper(rigid=rigid), {}
-        if pressure is not None:
-            damper, settings = replace(damper, {"gas.pressure": 1e5 * pressure}), {"gas.pressure": f"{pressure:g} bar"}
-        for amplitude, frequency in motions:
-            frequency *= tube.speed
-            test = SineTest(amplitude, frequency, CYCLES, rest_before=0.25 / frequency, run_up=1.0 / frequency)
-            for run in VirtualDyno(damper, SAMPLES * frequency, rig=MACHINE).run(test):
-                at = {key: f"{run.name} at {value}" for key, value in settings.items()}
-                runs.append(dataclasses.replace(run, settings=settings, name=at.get("gas.pressure", run.name)))
+    for amplitude, frequency in motions:
+        test = SineTest(amplitude, frequency, CYCLES, rest_before=0.25 / frequency, run_up=1.0 / frequency)
+        runs += VirtualDyno(damper, SAMPLES * frequency, rig=MACHINE).run(test)
     return runs
 
 
@@ -124,18 +64,33 @@ def noisy(runs: Sequence[BenchRun], seed: int) -> tuple[list[BenchRun], float]:
     return [dataclasses.replace(run, force=run.force + zero + rng.normal(0.0, NOISE, len(run))) for run in runs], zero
 
 
-def identified(tube: Tube, runs: Sequence[BenchRun], begin: FitResult | None, *, rigid: bool) -> FitResult:
+def tube(runs: Sequence[BenchRun]) -> MonoTube:
+    """The tube from records and geometry."""
+    velocity, force, stroke = (np.concatenate([getattr(r, c) for r in runs]) for c in ("velocity", "force", "stroke"))
+    return MonoTube.guess(velocity, force, stroke, **GEOMETRY)
+
+
+def start(runs: Sequence[BenchRun]) -> AbstractDamper:
+    """The damper, with rough values of heat and clearance."""
+    return Heated(Play(tube(runs) + ACROSS, stiffness=2e6, clearance=2e-4), sensitivity=0.002)
+
+
+def rigid_start(runs: Sequence[BenchRun]) -> AbstractDamper:
+    """The damper without clearance."""
+    return Heated(tube(runs) + ACROSS, sensitivity=0.002)
+
+
+def identified(runs: Sequence[BenchRun], begin: FitResult | None, rigid: bool) -> FitResult:
     """Damper and machine from records, started from these or from an earlier result."""
-    if begin is None:
-        law, rig = tube.start(runs, rigid=rigid), Rig(moving_mass=1.0, force_delay=2e-4, force_offset=1.0)
-    else:
+    law, rig = rigid_start if rigid else start, Rig(moving_mass=1.0, force_delay=2e-4, force_offset=1.0)
+    if begin is not None:
         law, rig = begin.law, begin.rig
-    return fit(law, runs, rig=rig, priors=PRIORS, starts=1, **tube.how)
+    return fit(law, runs, rig=rig, priors=PRIORS, starts=1, **HOW)
 
 
-def print_information(damper: AbstractDamper, runs: Sequence[BenchRun], how: dict[str, Any]) -> None:
+def print_information(damper: AbstractDamper, runs: Sequence[BenchRun]) -> None:
     """Standard errors that the records allow, each alone and all together, and the bias due to the steps of a fit."""
-    problem = prepare(damper, runs, rig=dataclasses.replace(MACHINE, force_offset=1e-6), **how)  # which frees it
+    problem = prepare(damper, runs, rig=dataclasses.replace(MACHINE, force_offset=1e-6), **HOW)  # which frees it
     residual, jacobian = (np.asarray(a) for a in linearised(problem.free, problem.free.values, problem.residuals))
     values, rows = np.asarray(problem.free.values), problem.owner >= 0
     prior = np.diag([(1.0 / ZERO_ERROR) ** 2 if name.endswith("offset") else 0.0 for name in problem.free.names])
@@ -203,24 +158,21 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=40)
     parser.add_argument("--laws", default="besinger_play,series_spring_dahl")
     parser.add_argument("--without-clearance", action="store_true")
-    parser.add_argument("--tube", default="mono", choices=TUBES)
     given = parser.parse_args()
-    tube, rigid = TUBES[given.tube], given.without_clearance
-    damper = tube.damper(rigid=rigid)
+    rigid, damper = given.without_clearance, RIGID if given.without_clearance else DAMPER
     begun = time.perf_counter()
 
     def passed(what: str) -> None:
         print(f"[{time.perf_counter() - begun:.0f} s] {what}", flush=True)
 
-    clean = records(tube, MOTIONS, tube.pressures, rigid=rigid)
-    others = records(tube, OTHERS, tube.others, rigid=rigid)
+    clean, others = records(damper, MOTIONS), records(damper, OTHERS)
     passed("records made")
-    print_information(damper, clean, tube.how)
+    print_information(damper, clean)
     runs, zero = noisy(clean, 0)
-    results, zeros = [identified(tube, runs, None, rigid=rigid)], [zero]
+    results, zeros = [identified(runs, None, rigid)], [zero]
     passed(f"first fit, from records and geometry, {results[0].steps} steps\n{results[0]}")
     measured = noisy(others, 10_000)[0]
-    print_score(f"{given.tube}-tube", results[0], others, measured)
+    print_score("mono-tube", results[0], others, measured)
     machine = ["offset", "mass", "delay"]
     for name in filter(None, given.laws.split(",")):
         law = default_ladder(runs, [name], rig=machine)[name]
@@ -228,7 +180,7 @@ def main() -> None:
         passed(name)
     for seed in range(1, given.repeats):
         runs, zero = noisy(clean, seed)
-        results.append(identified(tube, runs, results[0], rigid=rigid))
+        results.append(identified(runs, results[0], rigid))
         zeros.append(zero)
         passed(f"repeat {seed} of {given.repeats - 1}, {results[-1].steps} steps")
         if seed == given.repeats - 1 or seed % 10 == 0:
