@@ -4,14 +4,21 @@ Examples that begin with `jaxdamp.configure()` run beside others in one process,
 switches on double precision. `tests/test_configuration.py` makes it in processes of its own.
 """
 
+import contextlib
+import io
+import json
 import os
+from pathlib import Path
 
 import jax
 import numpy as np
-from sybil import Sybil
+from sybil import Example, Sybil
+from sybil.evaluators.python import PythonEvaluator
 from sybil.parsers.doctest import DocTestParser
-from sybil.parsers.markdown import PythonCodeBlockParser, SkipParser
+from sybil.parsers.markdown import CodeBlockParser, PythonCodeBlockParser, SkipParser
 
+
+EXAMPLES = Path(__file__).parent / "build" / "examples"
 
 # Most of the time goes into compiling, once for each test: compile quickly instead of for speed. With the variable set,
 # even to nothing, tests run what users run.
@@ -44,7 +51,26 @@ def _tidy(namespace: dict) -> None:
     jax.config.update("jax_numpy_dtype_promotion", namespace["promotion, as it is"])
 
 
+class _Printing(PythonEvaluator):
+    """Runs a block of a page, and keeps what it prints for the site (`docs/_examples.py`)."""
+
+    def __call__(self, example: Example) -> None:
+        with contextlib.redirect_stdout(io.StringIO()) as printed:
+            super().__call__(example)
+        if printed.getvalue():
+            file = EXAMPLES / f"{Path(example.path).stem}.json"
+            kept = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+            EXAMPLES.mkdir(parents=True, exist_ok=True)
+            file.write_text(json.dumps(kept | {example.parsed.strip(): printed.getvalue()}), encoding="utf-8")
+
+
+class _Blocks(PythonCodeBlockParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.codeblock_parser = CodeBlockParser("python", _Printing())
+
+
 pytest_collect_file = (
-    Sybil(parsers=[PythonCodeBlockParser(), SkipParser()], patterns=["*.md"], setup=_prepare, teardown=_tidy)
+    Sybil(parsers=[_Blocks(), SkipParser()], patterns=["*.md"], setup=_prepare, teardown=_tidy)
     + Sybil(parsers=[DocTestParser()], patterns=["jaxdamp/**/*.py", "jaxdamp/*.py"], setup=_prepare, teardown=_tidy)
 ).pytest()

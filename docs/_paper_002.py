@@ -34,9 +34,9 @@ def wheel_mode() -> float:
     return float(np.abs(np.linalg.eigvals(_equations(-1.0, 0.0))).max() / (2 * np.pi))
 
 
-def bump_height() -> float:
-    """Height [m] of the bump of equation 5, 0.125 s after its start."""
-    return float(roads.cosine_bump(0.06, start=1.0, duration=0.25).height(1.125)[0])
+def bump_height(time: float) -> float:
+    """Height [m] of the bump of equation 5 at this time [s]."""
+    return float(roads.cosine_bump(0.06, start=1.0, duration=0.25).height(time)[0])
 
 
 def improvement(linear: float, hybrid: float) -> float:
@@ -68,12 +68,21 @@ STATEMENTS = (
         lambda: growth(+1.0),
         unit="1/s",
     ),
-    Statement("eq. 5", "bump of 60 mm in 0.25 s", REPRODUCED, "`roads.cosine_bump`", 0.06, bump_height, 0.06, "m"),
+    Statement(
+        "eq. 5",
+        "bump of 60 mm in 0.25 s",
+        REPRODUCED,
+        "`roads.cosine_bump`",
+        0.06,
+        lambda: bump_height(1.125),
+        0.06,
+        "m",
+    ),
     Statement(
         "Table 1",
         "masses and stiffnesses",
         REPRODUCED,
-        "`presets.half_car_002`; first undamped mode",
+        "put into `presets.half_car_002`; first undamped mode",
         1.157,
         lambda: mode(0),
         unit="Hz",
@@ -115,7 +124,7 @@ STATEMENTS = (
     Statement(
         "text",
         "settling with the linear damper",
-        REPRODUCED,
+        CONSISTENT,
         "that of the pitch within 5 %, counted from the start of the run, with the fitted damping",
         3.490,
         "settling of the pitch",
@@ -181,6 +190,18 @@ STATEMENTS = (
         "breakpoints and weights are unpublished; `Hybrid` trains one, passive for any weights",
     ),
     Statement(
+        "Fig. 2, 4",
+        "schemes of the half car and of its Simulink model",
+        NOT_TREATED,
+        "drawings without numbers; `HalfCar` stands for both",
+    ),
+    Statement(
+        "text",
+        "agreement in kind with Demir et al.",
+        NOT_TREATED,
+        "their car and results are not in the paper; cubic springs and friction are simulated with numbers of our own",
+    ),
+    Statement(
         "Table 2",
         "peak acceleration, hybrid",
         NOT_TREATED,
@@ -210,7 +231,7 @@ STATEMENTS = (
         "RMS acceleration, hybrid",
         NOT_TREATED,
         FREE,
-        0.3004,
+        0.2988,
         "least levels sprung_acceleration",
         0.527,
         "m/s²",
@@ -243,7 +264,7 @@ STATEMENTS = (
         "the three peaks of the hybrid column together",
         NOT_TREATED,
         "not reached: the least of all passive forces that a search finds exceeds one of them by this factor; no proof",
-        1.059,
+        1.060,
         "peaks together",
         1.0,
         repeat=SEARCHED,
@@ -253,7 +274,7 @@ STATEMENTS = (
         "the three RMS values of the hybrid column together",
         NOT_TREATED,
         "not excluded: some passive forces, chosen in knowledge of the bump, stay below by this factor",
-        0.723,
+        0.7254,
         "rms together",
         1.0,
         repeat=SEARCHED,
@@ -262,17 +283,18 @@ STATEMENTS = (
         "Table 2",
         "first peaks of the hybrid column, with two rates",
         NOT_TREATED,
-        "the best of all bilinear dampers exceeds one of them by this factor",
-        1.43,
+        "not reached: the best of the bilinear dampers from 5 to 50 000 N s/m exceeds one of them by this factor",
+        1.218,
         "first peaks, bilinear",
         1.0,
+        repeat=0.02,
     ),
     Statement(
         "Table 3",
         "acceleration improved, on a virtual damper",
         NOT_TREATED,
         "a hybrid damper of the strength of the linear one, trained on a virtual damper",
-        2.5,
+        2.557,
         "rms reduction, hybrid",
         56.23,
         "%",
@@ -289,9 +311,33 @@ STATEMENTS = (
         repeat=0.02,
     ),
     Statement(
-        "Fig. 5 to 8",
-        "time histories",
+        "Fig. 3",
+        "road over time",
+        REPRODUCED,
+        "equation 5, drawn over the pictures of Figs. 5 and 6; height at t = 1.0625 s, half way up",
+        0.03,
+        lambda: bump_height(1.0625),
+        unit="m",
+    ),
+    Statement(
+        "Fig. 5, 6",
+        "the hybrid damper has lower peaks",
+        CONSISTENT,
+        "peak acceleration lower by this with a virtual hybrid damper; the numbers of the curves are not published",
+        10.9,
+        "peak reduction, hybrid",
+        unit="%",
+        repeat=0.05,
+    ),
+    Statement(
+        "Fig. 7, 8",
+        "axles and suspension deflections",
         NOT_TREATED,
-        "no numbers are published; `half_car_hybrid` draws them with the fitted damping and a virtual hybrid damper",
+        "no numbers are published; drawn with the fitted damping and a virtual hybrid damper, whose front rebound is "
+        "lower by this",
+        23.38,
+        "rebound reduction, hybrid",
+        unit="%",
+        repeat=0.05,
     ),
 )

@@ -101,7 +101,8 @@ def _save(figure: Figure, path: Path) -> None:
 
     raw = BytesIO()
     figure.savefig(raw, dpi=110)
-    Image.open(raw).convert("RGB").quantize(64).save(path, optimize=True)
+    few = Image.open(raw).convert("RGB").quantize(64, Image.Quantize.MAXCOVERAGE, 1, dither=Image.Dither.NONE)
+    few.save(path, optimize=True)  # a rare colour stays what it is
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """A statement of a paper with its verdict, a row of the table "paper against jaxdamp"."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 
@@ -47,11 +47,11 @@ class Statement(NamedTuple):
             return False
         return abs(self.ours - self.printed) <= max(self.tolerance * abs(self.printed), self.spread or 0.0)
 
-    def source(self, notebook: str) -> str:
-        """Where the number is computed."""
+    def source(self, notebook: str, cells: Mapping[str, int]) -> str:
+        """Where the number is computed: the cell of the notebook by `cells`, or the file of the statements."""
         if self.by is None:
             return ""
-        return f"`{notebook}`" if isinstance(self.by, str) else "this page"
+        return f"`{notebook}` [{cells[self.by]}]" if isinstance(self.by, str) else f"`docs/{self.by.__module__}.py`"
 
     def numbers(self) -> tuple[str, str]:
         """The number of the paper and that of jaxdamp, in words."""

@@ -9,6 +9,7 @@ from pathlib import Path
 here = Path(__file__).parent
 sys.path.insert(0, str(here))
 
+from _examples import EXAMPLES, add_outputs  # noqa: E402
 from _laws import draw_all as draw_laws  # noqa: E402
 from _links import resolve  # noqa: E402
 from _papers import write_table  # noqa: E402
@@ -26,6 +27,7 @@ extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_co
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_update_mathjax = False
 copybutton_prompt_text = "$ "
+copybutton_selector = "div:not(.highlight-text) > div.highlight pre"  # of code, not of what it prints
 myst_heading_anchors = 3
 default_role = "py:obj"  # docstrings write `name`: a link where it is a name of the library, else code
 
@@ -65,9 +67,12 @@ def setup(app):
     if unexecuted:
         words = "without results, because `pytest -m notebook` has not run since they changed: %s"
         logging.getLogger(__name__).warning(words, ", ".join(unexecuted))
+    if not EXAMPLES.exists():
+        logging.getLogger(__name__).warning("examples are without what they print, because `pytest` has not run")
     draw_all(here / "pictures")
     write_table(here / "papers.md")
     write_pages(here / "reference", draw_laws(here / "pictures" / "laws"))
+    app.connect("source-read", add_outputs)
     app.connect("autodoc-skip-member", skip_member)
     app.connect("autodoc-process-docstring", process_docstring, priority=400)  # before napoleon
     app.connect("autodoc-process-signature", process_signature)

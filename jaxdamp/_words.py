@@ -67,12 +67,20 @@ def typeset(text: str) -> str:
     >>> typeset("-0.3 m/s^1.75")
     '−0.3 m/s¹·⁷⁵'
     """
-    text = re.sub(r"\^(-?[\d.]*\d)", lambda power: power[1].translate(_RAISED), text)
-    return re.sub(r"(?<![\w])-(?=\d)", "−", text)
+    return re.sub(r"(?<![\w])-(?=\d)", "−", raised(text))
+
+
+def raised(text: str) -> str:
+    """A text with raised powers.
+
+    >>> raised("-0.3 m/s^1.75")
+    '-0.3 m/s¹·⁷⁵'
+    """
+    return re.sub(r"\^(-?[\d.]*\d)", lambda power: power[1].translate(_RAISED), text)
 
 
 # Of the library: lower case, with no digits but those of a preset (half_car_002); no file or record, nothing in a call.
-_NAME = re.compile(r"\b(?:(?:[a-z][a-z_]*|\d)\.)*[a-z]+(?:_[a-z]+)+(?:_\d{3})?\b(?!\.[a-z]{3,4}\b|[(=])")
+_NAME = re.compile(r"\b(?:(?:(?:[a-z][a-z_]*|\d)\.)*[a-z]+(?:_[a-z]+)+(?:_\d{3})?|m113_\w+)\b(?!\.[a-z]{3,4}\b|[(=])")
 
 
 def said(text: str) -> str:
@@ -80,13 +88,15 @@ def said(text: str) -> str:
 
     >>> said("weighted_rms_sprung_acceleration 0.78 -> 0.71 m/s^2 (-8.9 %) on iso:C, front.damper.law.lag_time at 5")
     'body acceleration, weighted RMS 0.78 → 0.71 m/s² (−8.9 %) on ISO class C, front damper lag time at 5'
-    >>> said("50mm_0.1Hz and Front_A are predicted worst by besinger_lag")
-    '50mm_0.1Hz and Front_A are predicted worst by Besinger + lag'
+    >>> said("50mm_0.1Hz and Front_A are predicted worst by besinger_lag in m113_003")
+    '50mm_0.1Hz and Front_A are predicted worst by Besinger + lag in m113 003'
     """
     text = re.sub(r"\biso:([A-H])\b", r"ISO class \1", text)
     text = re.sub(r"\bbump:([\d.]+):([\d.]+)", lambda at: f"a bump of {1e3 * float(at[1]):g} mm × {at[2]} m", text)
     text = _NAME.sub(lambda match: path_words(match[0]), text)
-    return typeset(text.replace("->", "→").replace("**", "·").replace("`", ""))
+    for plain, printed in (("->", "→"), ("<=", "≤"), (">=", "≥"), ("**", "·"), ("`", "")):
+        text = text.replace(plain, printed)
+    return typeset(text)
 
 
 def first_upper(words: str) -> str:

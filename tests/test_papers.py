@@ -46,6 +46,26 @@ def test_the_notebook_ends_with_the_table_and_computes_its_numbers(number):
     assert ast.literal_eval(last.value.args[0]) == number
 
 
+@pytest.mark.parametrize(
+    ("number", "name", "line"),
+    [
+        ("000", "15 Hz", "errors[name] = ["),
+        ("000", "trace of the linear law", "def apart("),
+        ("001", "stiffness", "refitted = {"),  # from a dictionary that is made as the notebook runs
+        ("001", "tyre load, front", "at_tyre,"),
+        ("002", "rms pitch", "met = identify.fit_targets("),
+        ("002", "least levels pitch", "bounds[measure.__name__"),
+        ("003", "two absorbers", "decay = {"),
+    ],
+)
+def test_the_table_names_the_cell_that_computes(number, name, line):
+    paper = papers.PAPERS[number]
+    path = Path(__file__).parents[1] / "notebooks" / f"{paper.notebook}.ipynb"
+    cells = [cell for cell in nbformat.read(path, as_version=4).cells if cell.cell_type == "code"]
+    place = papers.computing_cells(paper)[name]
+    assert line in cells[place - 1].source and cells[place - 1].execution_count == place
+
+
 def test_a_number_that_changed_or_is_missing_is_refused():
     wanted = {s.by: s for s in papers.PAPERS["000"].statements if isinstance(s.by, str)}
     computed = {name: s.ours if s.spread is None else (s.ours, s.spread) for name, s in wanted.items()}

@@ -13,6 +13,7 @@ from jaxdamp import bench, dampers, plots
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "docs"))
 laws, links = importlib.import_module("_laws"), importlib.import_module("_links")
+examples = importlib.import_module("_examples")
 NAMES = importlib.import_module("_reference").NAMES
 
 
@@ -66,3 +67,11 @@ def test_types_of_one_name_are_told_apart():
 )
 def test_addresses_of_other_libraries(name, address):
     assert links.page(name) == address
+
+
+def test_an_example_is_followed_by_what_it_printed() -> None:
+    page = "```python\nprint(1)\n```\n\nText.\n\n```python\nx = 1\n```\n"
+    shown = examples.with_outputs(page, {"print(1)": "1\n", "x = 2": "of an earlier text\n"})
+    assert shown == page.replace("```\n\nText", "```\n\n```text\n1\n```\n\nText")
+    long = examples.with_outputs(page, {"print(1)": "line\n" * 100})
+    assert long.count("line") == examples.LINES and "\n...\n```" in long

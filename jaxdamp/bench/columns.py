@@ -126,7 +126,8 @@ def find_one(table: RawTable, role: str, choice: Choice) -> int | None:
 
 def _index(table: RawTable, role: str, choice: Choice) -> tuple[int | None, list[str]]:
     if role in choice.columns:
-        return _given(table, role, choice.columns[role]), []
+        wanted = choice.columns[role]
+        return (None if wanted is None else given_column(table, role, wanted)), []
     return _named(table, role, choice)
 
 
@@ -136,11 +137,13 @@ def _column(table: RawTable, role: str, choice: Choice) -> tuple[Column | None, 
     return (None if index is None else column_of(table, role, index, choice)), notes
 
 
-def _given(table: RawTable, role: str, wanted: str | int | None) -> int | None:
-    if wanted is None:
-        return None
-    names = ", ".join(map(repr, table.names))
-    given = Setting("columns", {role: wanted})
+def given_column(table: RawTable, role: str, wanted: str | int, argument: str = "columns") -> int:
+    """The number of the column that the caller names for a quantity, by its header or number, in an argument."""
+
+    def said(value: str | int) -> Setting:
+        return Setting(argument, {role: value} if argument == "columns" else value)
+
+    names, given = ", ".join(map(repr, table.names)), said(wanted)
     if isinstance(wanted, int):
         if not 0 <= wanted < len(table.columns):
             raise ArgumentError(f"{given}: {table.where} has columns 0 to {len(table.columns) - 1} ({names}).", given)
@@ -149,15 +152,12 @@ def _given(table: RawTable, role: str, wanted: str | int | None) -> int | None:
     if len(hits) == 1:
         return hits[0]
     if hits:
-        numbers = Setting("columns", {role: hits[0]})
-        raise ArgumentError(
-            f"{given}: {table.where} has {len(hits)} columns of that name. Give the number: {numbers}.",
-            given,
-            numbers,
-        )
-    near = _checks.nearest(wanted, table.names)
+        number = said(hits[0])
+        same = f"{table.where} has {len(hits)} columns of that name"
+        raise ArgumentError(f"{given}: {same}. Give the number: {number}.", given, number)
+    near = _checks.nearest(wanted, [*table.names, *(split_header(name)[0] for name in table.names)])
     hint = f" Did you mean {near!r}?" if near else ""
-    raise ArgumentError(f"{given}: {table.where} has {names}.{hint}", given)
+    raise ArgumentError(f"{given}: {table.where} has no column {wanted!r}; it has {names}.{hint}", given)
 
 
 def _places(table: RawTable, wanted: str | int | None) -> list[int]:

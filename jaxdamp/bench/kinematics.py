@@ -12,7 +12,7 @@ from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
 from jaxdamp._files import FOLDER_SUFFIXES, find_files
 from jaxdamp.bench import sign as signs
-from jaxdamp.bench.columns import Choice
+from jaxdamp.bench.columns import Choice, given_column
 from jaxdamp.bench.headers import split_header
 from jaxdamp.bench.raw import RawTable
 from jaxdamp.bench.readers import READERS, read_tables
@@ -122,7 +122,7 @@ def read_kinematics(
 
 def _columns(table: RawTable, chosen: Mapping[str, str | int]) -> dict[str, int]:
     """The columns of the wheel travel, and of the damper travel or else of the ratio."""
-    found = {role: _place(table, wanted) for role, wanted in chosen.items()}
+    found = {role: given_column(table, role, wanted) for role, wanted in chosen.items()}
     for index, name in enumerate(table.names):
         role = _role(table, index)
         if role is None or index in found.values() or role in chosen:
@@ -155,16 +155,6 @@ def _role(table: RawTable, index: int) -> str | None:
     unit, words = table.columns[index].unit or written or "", _words(name)
     role = next((role for role, own in _WORDS.items() if words & own), None)
     return None if role != "ratio" and unit and conversion("stroke", unit) is None else role
-
-
-def _place(table: RawTable, wanted: str | int) -> int:
-    """The number of the column that the caller names."""
-    if isinstance(wanted, str):
-        _checks.one_of("columns", wanted, table.names)
-        return table.names.index(wanted)
-    if not 0 <= wanted < len(table.names):
-        _checks.refuse("columns", f"name columns or give numbers from 0 to {len(table.names) - 1}", wanted)
-    return wanted
 
 
 def _direction(table: RawTable, header: str, sign: str | None) -> tuple[float, str]:

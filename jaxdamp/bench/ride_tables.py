@@ -8,6 +8,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp.bench import clock, stamps
+from jaxdamp.bench.columns import given_column
 from jaxdamp.bench.headers import split_header
 from jaxdamp.bench.motion import Samples
 from jaxdamp.bench.raw import RawTable
@@ -50,11 +51,11 @@ def ride_record(table: RawTable, name: str, how: RideInterpretation) -> RideReco
         ValueError: a column that is missing, doubtful, without a unit, or holds something else than numbers.
     """
     headers = [split_header(column.name)[0] for column in table.columns]
-    roads = [_index(table, headers, ROAD, which) for which in _road_columns(table, headers, how.road)]
+    roads = [given_column(table, ROAD, which, "road") for which in _road_columns(table, headers, how.road)]
     time_column = (how.columns or {}).get("time", "time" if "time" in headers else None)
     chosen = _channels(table, headers, how.columns, {*roads}, time_column)
     how.check_names(chosen)
-    time = _time(table, headers, time_column, how)
+    time = _time(table, time_column, how)
     channels = {channel: _values(table, index, channel, how) for channel, index in chosen.items()}
     wheels = [_values(table, index, ROAD, how) for index in roads]
     kinds = {unit for _, unit in wheels}
@@ -89,7 +90,7 @@ def _channels(
     """Number of the column of each channel: those asked for, or all that have a name."""
     if columns is None:
         return {h: i for i, h in enumerate(headers) if h and i not in roads and h != time_column}
-    return {channel: _index(table, headers, channel, which) for channel, which in columns.items() if channel != "time"}
+    return {channel: given_column(table, channel, which) for channel, which in columns.items() if channel != "time"}
 
 
 def _road_columns(
@@ -104,21 +105,6 @@ def _road_columns(
         remedy = 'Name the columns of the heights under the wheels: `road=["platform"]`.'
         raise ValueError(f"{table.where} has no column `road`; there are {', '.join(table.names)}. {remedy}")
     return [*roads]
-
-
-def _index(table: RawTable, headers: Sequence[str], channel: str, which: str | int) -> int:
-    """Number of a column."""
-    if isinstance(which, int):
-        if not 0 <= which < len(headers):
-            raise ValueError(f"{table.where} has {len(headers)} columns, none of number {which} for {channel!r}.")
-        return which
-    fitting = [i for i, names in enumerate(zip(headers, table.names, strict=True)) if which in names]
-    if len(fitting) != 1:
-        near = _checks.nearest(which, [*headers])
-        hint = f" Did you mean {near!r}?" if near and not fitting else ""
-        count = f"{len(fitting)} columns" if fitting else "no column"
-        raise ValueError(f"{table.where} has {count} {which!r} for {channel!r}; it has {', '.join(table.names)}.{hint}")
-    return fitting[0]
 
 
 def _values(table: RawTable, index: int, channel: str, how: RideInterpretation) -> tuple[Samples, str]:
@@ -146,7 +132,7 @@ def _to_si(written: str, units: Sequence[str]) -> tuple[float | None, str]:
     return next(((factor, unit) for unit in units if (factor := ratio(plain, unit)) is not None), (None, ""))
 
 
-def _time(table: RawTable, headers: Sequence[str], time_column: str | int | None, how: RideInterpretation) -> Samples:
+def _time(table: RawTable, time_column: str | int | None, how: RideInterpretation) -> Samples:
     """The instants [s]."""
     rate = how.sampling_rate
     if time_column is None:
@@ -155,7 +141,7 @@ def _time(table: RawTable, headers: Sequence[str], time_column: str | int | None
         return clock.uniform_time(rate, len(table))
     if rate is not None:
         raise ValueError(f"{table.where} has a column of time: leave `sampling_rate` out.")
-    index = _index(table, headers, "time", time_column)
+    index = given_column(table, "time", time_column)
     raw = table.columns[index]
     where = f"{table.where}, column {table.names[index]!r}"
     if raw.is_text:

@@ -3,7 +3,7 @@
 import signal
 from typing import TYPE_CHECKING, Any
 
-from jaxdamp.cli import interrupt
+from jaxdamp.cli import interrupt, streams
 
 
 if TYPE_CHECKING:
@@ -15,6 +15,7 @@ __all__ = ["app", "main"]
 
 def main() -> None:
     """Run the command line as a program of its own; Ctrl-C is answered from the first import on."""
+    streams.write_plainly()
     with interrupt.watched(then=signal.SIG_IGN):  # nothing is left to stop while the process ends
         from jaxdamp.cli.application import app
 

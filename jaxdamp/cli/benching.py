@@ -41,7 +41,7 @@ def bench_command(
     with job(screen, "bench", output) as work:
         with screen.stage("Reading the records"):
             raw = reading.raw(files)
-        screen.table(records_table(tuple(raw)))
+        screen.details(records_table(tuple(raw)))
         sound, found = reading.checked(screen, raw)
         runs = reading.processed(sound)
         remarks = decisions(runs)

@@ -12,12 +12,12 @@ from jaxdamp.cli.fitting import fit_laws, show, write_fits
 from jaxdamp.cli.jobs import Output, job, with_step_warnings, without_range_warnings, write_tables
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.records import Reading, decisions, grouped, law_names
-from jaxdamp.cli.riding import Driving, headline, unusual
+from jaxdamp.cli.riding import Driving, show_ride, unusual
 from jaxdamp.cli.tuning import exit_code_of, tuned, tuning_arguments, write_tuning
 from jaxdamp.cli.vehicle_words import parse_vehicle
 from jaxdamp.dampers import AbstractDamper, not_identified
 from jaxdamp.parameters import parameters
-from jaxdamp.report import chain_report, records_table, ride_tables, ride_verdict
+from jaxdamp.report import chain_report, records_table
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import Response
 from jaxdamp.vehicles import AbstractVehicle
@@ -62,7 +62,7 @@ def report(
         if len(groups) > 1:
             raise ValueError(f"A report is on one setting of a damper: name the records of one. {divided}")
         remarks = decisions(runs)
-        screen.table(records_table(tuple(runs)))
+        screen.details(records_table(tuple(runs)))
         screen.points(remarks)
         car = make(None)
         fits = fit_laws(screen, names, runs, BenchSet(), keep_bad=reading.keep_bad)
@@ -83,11 +83,8 @@ def report(
             result = tuned(screen, call)
             cars["tuned law"] = result.vehicle
         remarks += sentences
-        rides = _rides(screen, cars, surface, run)
-        tables = ride_tables(rides)
-        screen.answer(*ride_verdict(rides))
-        screen.table(headline(screen, tables["metrics"], car))
-        screen.details(*(table for name, table in tables.items() if name != "metrics"))
+        rides = driven(screen, cars, surface, run, "Driving")
+        tables = show_ride(screen, rides)
         with work.saving("Tuned law, vehicle and tables") as draft:
             if result is not None:
                 write_tuning(draft, result)
@@ -104,12 +101,12 @@ def _nothing_to_tune(law: AbstractDamper, search: Call) -> bool:
     return "over" not in search.given and adjustable <= set(not_identified(law))
 
 
-def _rides(
-    screen: Screen, cars: dict[str, AbstractVehicle], road: AbstractRoad, run: Mapping[str, Any]
+def driven(
+    screen: Screen, cars: Mapping[str, AbstractVehicle], road: AbstractRoad, run: Mapping[str, Any], title: str
 ) -> dict[str, Response]:
     """Each vehicle on the road."""
     rides: dict[str, Response] = {}
-    with screen.stage("Driving", total=len(cars)) as advance:
+    with screen.stage(title, total=len(cars)) as advance:
         for name, car in cars.items():
             advance(name, len(rides))
             with without_range_warnings():

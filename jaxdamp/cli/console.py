@@ -1,5 +1,6 @@
 """What the commands share at the terminal: tables, stages with their progress, errors in one sentence."""
 
+import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -17,6 +18,7 @@ from rich.text import Text
 
 from jaxdamp._display import display
 from jaxdamp._tables import Column, Table
+from jaxdamp._words import first_upper, raised
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.wording import message
 
@@ -36,27 +38,30 @@ class Screen:
     def __init__(self) -> None:
         self.verbose = False
         self.live = sys.stdout.isatty()  # whatever colours are forced; a notebook and a pipe keep every frame
-        self.console = Console(width=None if self.live else _WIDTH_OF_FILES, highlight=False)
+        width = None if self.live else shutil.get_terminal_size((_WIDTH_OF_FILES, 50)).columns  # COLUMNS, if it is set
+        self.console = Console(width=width, highlight=False)
         self.times: dict[str, float] = {}
 
     def say(self, text: str = "", style: str = "") -> None:
         """A paragraph, taken literally."""
-        self.console.print(literal(display().words(text), style), soft_wrap=False)
+        self.console.print(_printed(text, style), soft_wrap=False)
 
     def heading(self, text: str) -> None:
         """A section begins."""
         self.console.print()
-        self.console.print(literal(display().words(text), "bold"))
+        self.console.print(_printed(text, "bold"))
 
     def answer(self, *sentences: str) -> None:
         """What the command was asked for, in words."""
         self.console.print()
-        self.say(" ".join(filter(None, sentences)), "bold")
+        self.say(" ".join(s if "_" in s.split(" ")[0] else first_upper(s) for s in sentences if s), "bold")
 
     def points(self, items: Sequence[str], style: str = "") -> None:
         """A list of remarks."""
         for item in items:
-            self.console.print(literal(f"  - {display().words(item)}", style))
+            lines = _printed(item, style).wrap(self.console, max(self.console.width - 4, 20))
+            for number, line in enumerate(lines):
+                self.console.print(Text("    " if number else "  - ", style).append_text(line), soft_wrap=True)
 
     def remarks(self, items: Sequence[str], style: str = "") -> None:
         """The first remarks of a list that is sorted by consequence, and how many more are on the page."""
@@ -120,12 +125,17 @@ class Screen:
 
                 yield advance
         else:
-            self.say(f"{title} ...")
+            self.say(f"{title} ...")  # a log has the title once
             yield lambda detail, done: interrupt.check()
         seconds = time.perf_counter() - started
         self.times[title] = seconds
         if seconds >= _QUICK:
-            self.say(f"{title}: done in {seconds:.1f} s", "green")
+            self.say(f"{title}: done in {seconds:.1f} s" if self.live else f"  done in {seconds:.1f} s", "green")
+
+
+def _printed(text: str, style: str = "") -> Text:
+    """A sentence in the reader's words, units and signs, with raised powers and arrows."""
+    return literal(raised(display().words(text)).replace(" -> ", " → "), style)
 
 
 def literal(text: str, style: str = "") -> Text:

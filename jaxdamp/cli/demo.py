@@ -4,40 +4,28 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from jaxdamp import bench, export, plots, roads, simulate, tune, vehicles
+from jaxdamp import bench, export, roads, vehicles
 from jaxdamp._tables import Table
-from jaxdamp._types import Figure
 from jaxdamp.bench import BenchSet, SineTest, VirtualDyno
+from jaxdamp.cli.chaining import driven
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.demo_words import (
-    COMFORT,
-    GRIP,
-    TRUE,
-    add_rides,
-    outcome,
-    purpose,
-    ride_table,
-    ride_verdict,
-    show_rides,
-)
 from jaxdamp.cli.fitting import Fitted, fit_laws, show, write_fits
-from jaxdamp.cli.jobs import Job, Output, job, without_range_warnings, write_tables
+from jaxdamp.cli.jobs import Output, job, write_tables
+from jaxdamp.cli.riding import show_ride
+from jaxdamp.cli.tuning import tuned, write_tuning
 from jaxdamp.dampers import AbstractDamper, Besinger, SeriesSpring
 from jaxdamp.identify import FitResult
-from jaxdamp.report import (
-    Attempts,
-    Report,
-    add_fits,
-    add_other_fits,
-    add_records,
-    add_tuning,
-    fit_verdict,
-    fitted_velocities,
-)
+from jaxdamp.report import Attempts, Report, chain_report, ride_tables
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import Response
 from jaxdamp.tune import TuneResult
 from jaxdamp.vehicles import AbstractVehicle
+
+
+TRUE = "true damper"
+EVENT = 2.0  # s: length of a ride over a bump
+ISO = "ISO 8608 class C at 20 m/s"
+BUMP = "a bump, 60 mm high and 2 m long, at 10 m/s"
 
 
 def _true_law() -> AbstractDamper:
@@ -86,11 +74,6 @@ class Scenario:
     seed: int = 0
 
 
-EVENT = 2.0  # s: length of a ride over a bump
-ISO = "ISO 8608 class C at 20 m/s"
-BUMP = "a bump, 60 mm high and 2 m long, at 10 m/s"
-
-
 def demo(screen: Screen, *, seed: int = 0, output: Output) -> None:
     """Run the whole chain on a damper whose truth is known. Needs no input.
 
@@ -107,22 +90,26 @@ def run_demo(screen: Screen, scenario: Scenario, output: Output) -> None:
     """Records, fits, rides, a tuning, and a folder with all of it: laws and tables first, then the pictures."""
     with job(screen, "demo", output) as work:
         runs = record(screen, scenario, work.results.draft)
-        held = runs.select(scenario.held_out)
-        fits = fit_laws(screen, scenario.laws, runs.without(scenario.held_out), held)
+        fits = fit_laws(screen, scenario.laws, runs.without(scenario.held_out), runs.select(scenario.held_out))
+        show(screen, fits)
         truth = next((rung.result for rung in fits.comparison.rungs if rung.name == scenario.true_name), None)
-        show_fits(screen, fits, truth, scenario)
         with work.saving("Laws and tables", f"the rides, the tuning, {fits.missing}") as draft:
             write_fits(draft, fits.comparison, runs, work.attempts)
             _write_truth(draft, truth, scenario, work.attempts)
-        rides = {name: ride(screen, name, road, fits, scenario) for name, road in _roads(scenario).items()}
-        show_rides(screen, rides)
-        tuned = None if truth is None else improve(screen, truth, scenario)
-        if tuned is not None:
-            show_tuning(screen, tuned, scenario)
-        _save_rides(work, rides, tuned, fits)
-        work.page(_page, scenario, runs, held, fits, truth, rides, tuned)
+        rides = _rides(screen, scenario, fits)
+        result = None if truth is None else _tuned(screen, truth, scenario)
+        if truth is not None:
+            screen.details(truth_table(scenario, truth))
+        screen.say(truth_verdict(scenario, truth))
+        with work.saving("Rides and tuning") as draft:
+            for number, responses in enumerate(rides.values(), 1):
+                tables = {f"ride_{number}_{name}": table for name, table in ride_tables(responses).items()}
+                write_tables(draft / "tables", tables)
+            if result is not None:
+                write_tuning(draft, result)
+        work.page(_page, scenario, runs, fits, truth, rides, result)
         target = work.results.target
-    screen.table(screen.times_table())
+    screen.details(screen.times_table())
     screen.say(f"Open {target / 'report.html'}. The records are files like those of a real bench; fit them yourself:")
     screen.say(f'  jaxdamp fit {target / "records"} --held-out "{scenario.held_out}" --sign rebound-positive', "bold")
 
@@ -130,37 +117,38 @@ def run_demo(screen: Screen, scenario: Scenario, output: Output) -> None:
 def _page(
     scenario: Scenario,
     runs: BenchSet,
-    held: BenchSet,
     fits: Fitted,
     truth: FitResult | None,
     rides: Mapping[str, Mapping[str, Response]],
-    tuned: TuneResult | None,
+    tuning: TuneResult | None,
     *,
     folder: Path,
     attempts: Attempts,
 ) -> Report:
-    """The page of the demonstration."""
-    report = Report("jaxdamp demo: from bench records to a better damper", folder, attempts)
-    preflight = bench.preflight(runs)
-    report.verdict(
-        f"{preflight.summary}.",
-        *fit_verdict(report, fits.comparison),
-        *([] if tuned is None else [tuned.verdict.sentence, outcome(tuned)]),
-        *(f"{name}: {ride_verdict(responses)}" for name, responses in rides.items()),
-        "" if truth is None else truth_verdict(scenario, truth),
+    """The page of the chain, with the truth."""
+    noise = f"sensor noise of {scenario.force_noise:g} N and {1e6 * scenario.stroke_noise:g} µm"
+    page = chain_report(
+        fits.comparison,
+        rides,
+        tuning,
+        title="jaxdamp demo: from bench records to a better damper",
+        sentences=[truth_verdict(scenario, truth)],
+        sheets=False,
+        preflight=bench.preflight(runs),
+        runs=tuple(runs),
+        remarks=[
+            f"A virtual bench recorded a known damper under {len(scenario.tests)} sines, with {noise}. "
+            f"The records {scenario.held_out} were held out of all fits.",
+            f"The true damper: {scenario.law!r}",
+            *fits.failures,
+        ],
+        folder=folder,
+        attempts=attempts,
     )
-    _introduce(report, scenario)
-    add_records(report, tuple(runs), tuple(held), preflight=preflight)
-    add_fits(report, fits.comparison, fits.failures, others=False)
-    _report_truth(truth, scenario, report)
-    add_rides(report, rides)
-    if tuned is not None:
-        _report_tuning(tuned, rides[ISO][scenario.true_name], scenario, report)
-    add_other_fits(report, fits.comparison)
-    return report
-
-
-# ---- the steps
+    if truth is not None:
+        page.heading("Was the truth found?")
+        page.table(truth_table(scenario, truth))
+    return page
 
 
 def record(screen: Screen, scenario: Scenario, folder: Path) -> BenchSet:
@@ -175,10 +163,19 @@ def record(screen: Screen, scenario: Scenario, folder: Path) -> BenchSet:
         return bench.read([folder / "records" / f"{name}.csv" for name in records.names])
 
 
-def _roads(scenario: Scenario) -> dict[str, AbstractRoad]:
-    """A random road and an event."""
+def _rides(screen: Screen, scenario: Scenario, fits: Fitted) -> dict[str, dict[str, Response]]:
+    """On a random road and over a bump: the true damper, the law with the largest error, and the recommended one."""
     random = roads.iso8608("C", speed=20.0, seed=scenario.seed)
-    return {ISO: random, BUMP: roads.cosine_bump(0.06, start=0.5, duration=0.2)}
+    surfaces: dict[str, AbstractRoad] = {ISO: random, BUMP: roads.cosine_bump(0.06, start=0.5, duration=0.2)}
+    comparison = fits.comparison
+    both = (max(comparison.rungs, key=lambda rung: rung.error), comparison.best)
+    cars = {name: _car(law) for name, law in {TRUE: scenario.law, **{r.name: r.result.law for r in both}}.items()}
+    rides = {}
+    for title, road in surfaces.items():
+        duration = scenario.duration if title == ISO else min(scenario.duration, EVENT)
+        rides[title] = driven(screen, cars, road, {"duration": duration}, f"Quarter car on {title}")
+        show_ride(screen, rides[title])
+    return rides
 
 
 def _car(law: AbstractDamper) -> AbstractVehicle:
@@ -186,43 +183,17 @@ def _car(law: AbstractDamper) -> AbstractVehicle:
     return vehicles.presets.quarter_car_mathworks(law)
 
 
-def ride(screen: Screen, title: str, road: AbstractRoad, fits: Fitted, scenario: Scenario) -> dict[str, Response]:
-    """The quarter car with the true damper and with every fitted law."""
-    laws = {TRUE: scenario.law} | {rung.name: rung.result.law for rung in fits.comparison.rungs}
-    duration = scenario.duration if title == ISO else min(scenario.duration, EVENT)
-    responses = {}
-    with screen.stage(f"Quarter car on {title}", len(laws)) as advance:
-        for done, (name, law) in enumerate(laws.items()):
-            advance(name, done)
-            with without_range_warnings():
-                responses[name] = simulate(_car(law), road, duration=duration)
-    return responses
-
-
-def improve(screen: Screen, truth: FitResult, scenario: Scenario) -> TuneResult:
-    """Tune the fitted damper's coefficients for comfort, keep the tyre's grip, and try it on roads not tuned on."""
-    with screen.stage("Tuning for comfort") as advance:
-        return tune.minimise(
-            COMFORT,
-            _car(truth.law),
-            _roads(scenario)[ISO],
-            over=["damper.**rate"],
-            limits={GRIP: f"{100 * (scenario.tyre_load - 1):+.0f}%"},
-            fresh_roads=scenario.fresh_roads,
-            duration=scenario.duration,
-            progress=lambda step, metric: advance(f"step {step}: {metric:.4f} m/s²", step),
-        )
-
-
-# ---- what they say
-
-
-def show_fits(screen: Screen, fits: Fitted, truth: FitResult | None, scenario: Scenario) -> None:
-    """The ladder and the recovered parameters."""
-    show(screen, fits)
-    if truth is not None:
-        screen.table(truth_table(scenario, truth))
-        screen.say(truth_verdict(scenario, truth))
+def _tuned(screen: Screen, truth: FitResult, scenario: Scenario) -> TuneResult:
+    """The fitted damper with its coefficients tuned for comfort, tried on roads that the tuning had not seen."""
+    more = f"{100 * (scenario.tyre_load - 1):+.0f}%"
+    screen.say(
+        "For this light car the damper is stiff: it holds the tyre to the road and shakes the body. Its damping "
+        f"coefficients are tuned for comfort, while the RMS variation of the tyre load may grow: {more} at most."
+    )
+    road = roads.iso8608("C", speed=20.0, seed=scenario.seed)
+    limits, run = {"grip": more}, {"duration": scenario.duration, "fresh_roads": scenario.fresh_roads}
+    what = {"metric": "comfort", "vehicle": _car(truth.law), "road": road, "over": ["damper.**rate"]}
+    return tuned(screen, what | {"limits": limits} | run)
 
 
 def truth_table(scenario: Scenario, result: FitResult) -> Table:
@@ -230,8 +201,10 @@ def truth_table(scenario: Scenario, result: FitResult) -> Table:
     return result.table(scenario.law, title=f"Parameters of {scenario.true_name}, fitted and true")
 
 
-def truth_verdict(scenario: Scenario, result: FitResult) -> str:
+def truth_verdict(scenario: Scenario, result: FitResult | None) -> str:
     """Whether the fit found the truth, in words."""
+    if result is None:
+        return f"{scenario.true_name} could not be fitted."
     rows = truth_table(scenario, result).records()
     determined = [row for row in rows if not row["note"]]
     off = [abs(cell) for cell in (row["(value − true)/se"] for row in determined) if isinstance(cell, float)]
@@ -242,68 +215,8 @@ def truth_verdict(scenario: Scenario, result: FitResult) -> str:
     return f"{len(off)} parameters are determined; they are at most {max(off):.1f} standard errors off.{blind}"
 
 
-def show_tuning(screen: Screen, tuned: TuneResult, scenario: Scenario) -> None:
-    """What the tuning did, on its road and on others."""
-    screen.say(purpose(scenario.tyre_load))
-    screen.say(tuned.verdict.sentence)
-    screen.table(tuned.parameter_table())
-    screen.table(tuned.table())
-    screen.say(outcome(tuned))
-    screen.points(tuned.warnings, style="yellow")
-    if tuned.fresh is not None:
-        screen.table(tuned.fresh.table())
-
-
-# ---- what is written
-
-
-def _introduce(report: Report, scenario: Scenario) -> None:
-    report.text(
-        f"A virtual bench recorded a known damper under {len(scenario.tests)} sines, with sensor noise of",
-        f"{scenario.force_noise:g} N and {1e6 * scenario.stroke_noise:g} µm. The records {scenario.held_out} were held",
-        "out of all fits. Stroke and velocity are positive in rebound, force is positive when it resists extension.",
-    )
-    report.text(f"The true damper: {scenario.law!r}")
-
-
 def _write_truth(folder: Path, truth: FitResult | None, scenario: Scenario, attempts: Attempts) -> None:
     with attempts.part("true_law.json"):
         export.to_json(scenario.law, folder / "true_law.json")
     if truth is not None:
         write_tables(folder / "tables", {"parameters_and_truth": truth_table(scenario, truth)})
-
-
-def _save_rides(work: Job, rides: Mapping[str, Mapping[str, Response]], tuned: TuneResult | None, fits: Fitted) -> None:
-    """Put the tables of the rides and the tuning into place, and the tuned law."""
-    tables = {f"ride_{i}": ride_table(title, ride) for i, (title, ride) in enumerate(rides.items(), 1)}
-    with work.saving("Rides and tuning") as draft:
-        if tuned is not None:
-            tables |= {"tuned_parameters": tuned.parameter_table(), "tuned_metrics": tuned.table()}
-            if tuned.fresh is not None:
-                tables["tuned_on_fresh_roads"] = tuned.fresh.table()
-            law = tuned.vehicle.elements()[0]
-            with work.attempts.part("tuned_law.json"):
-                export.to_json(law, draft / "tuned_law.json")
-            with work.attempts.part("tuned_law_force_velocity.csv"):
-                export.to_csv(law, draft / "tuned_law_force_velocity.csv", fitted_velocities(fits.comparison))
-        write_tables(draft / "tables", tables)
-
-
-def _report_truth(truth: FitResult | None, scenario: Scenario, report: Report) -> None:
-    report.heading("Was the truth found?")
-    if truth is None:
-        report.text(f"{scenario.true_name} could not be fitted.")
-        return
-    report.table(truth_table(scenario, truth))
-
-
-def _report_tuning(tuned: TuneResult, before: Response, scenario: Scenario, report: Report) -> None:
-    def rides() -> Figure:
-        with without_range_warnings():
-            after = simulate(tuned.vehicle, _roads(scenario)[ISO], duration=scenario.duration)
-            return plots.ride({"before": before, "after": after})
-
-    report.heading(tuned.verdict.outcome.value)
-    report.text(purpose(scenario.tyre_load))
-    add_tuning(report, tuned)
-    report.picture(rides, f"Quarter car on {ISO}, before and after", "tuning_ride.png")

@@ -99,7 +99,7 @@ def fit(
         groups, divided = grouped(runs, group_by)
         _check_groups(groups, held, None if report is None else f"{report}", divided)
         remarks = [*decisions(runs), *filter(None, [divided])]
-        screen.table(records_table(tuple(runs), tuple(held)))
+        screen.details(records_table(tuple(runs), tuple(held)))
         screen.points(remarks)
         options["keep_bad"] = reading.keep_bad
         options["scheduled"] = group_by is None and len({run.command for run in runs}) > 1

@@ -107,9 +107,11 @@ class Reading:
 
     def _show(self, screen: Screen, found: Preflight) -> None:
         """The worst findings, or all."""
-        screen.heading(found.summary)
         sentences = found.sentences()
         shown = sentences if screen.verbose else [text for text in sentences if not text.startswith("note")][:_LINES]
+        if not shown:
+            return
+        screen.heading(found.summary)
         for sentence in shown:
             screen.points([sentence], style=_COLOURS[sentence.split(",")[0]])
         if len(sentences) > len(shown):

@@ -169,12 +169,8 @@ def ride(
                         lambda car=car: simulate(car, surface, **how.arguments(**run))
                     )
                 remarks += [f"{name}: {text}" for text in warned]
-            tables = ride_tables(responses)
-            latest_first = dict(reversed(responses.items()))
-            remarks += notes_of(latest_first)
-        screen.answer(*ride_verdict(responses))
-        screen.table(headline(screen, tables["metrics"], next(iter(responses.values())).vehicle))
-        screen.details(*(table for name, table in tables.items() if name != "metrics"))
+            remarks += notes_of(dict(reversed(responses.items())))
+        tables = show_ride(screen, responses)
         screen.remarks(remarks, style="yellow")
         axles = axles_sentence(responses)
         if axles:
@@ -185,6 +181,15 @@ def ride(
             write_tables(draft, tables)
             plots.animation(responses, draft / "animation.html", title=title)
         work.page(ride_report, responses, title=title, laws=laws, remarks=remarks)
+
+
+def show_ride(screen: Screen, responses: Mapping[str, Response]) -> dict[str, Table]:
+    """Rides on one road at the terminal: the answer and the main metrics; all tables by name."""
+    tables = ride_tables(responses)
+    screen.answer(*ride_verdict(responses))
+    screen.table(headline(screen, tables["metrics"], next(iter(responses.values())).vehicle))
+    screen.details(*(table for name, table in tables.items() if name != "metrics"))
+    return tables
 
 
 def headline(screen: Screen, table: Table, vehicle: AbstractVehicle, more: Collection[str] = ()) -> Table:

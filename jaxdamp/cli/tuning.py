@@ -18,7 +18,7 @@ from jaxdamp.cli.controlling import Controlling
 from jaxdamp.cli.jobs import Output, job, write_tables
 from jaxdamp.cli.limits import bounds_in_si, in_si
 from jaxdamp.cli.options import Call
-from jaxdamp.cli.riding import Driving, beyond_vehicles, headline, unusual
+from jaxdamp.cli.riding import Driving, beyond_vehicles, unusual
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, read_module, with_law, write_laws
 from jaxdamp.control import Controlled
 from jaxdamp.dampers import AbstractDamper
@@ -147,7 +147,7 @@ def tuned(screen: Screen, call: Mapping[str, Any]) -> TuneResult[Any]:
     screen.answer(result.verdict.sentence)
     screen.say(result.summary.removeprefix(result.verdict.sentence).strip())
     screen.table(result.parameter_table())
-    screen.table(headline(screen, result.table(), result.vehicle, {result.metric, *result.limits}))
+    screen.details(result.table())
     screen.remarks(result.warnings, style="yellow")
     return result
 

@@ -63,7 +63,7 @@ def fit_vehicle(
             benches = bench_words(how.given.get("bench", ()), car)
         remarks = [f"{ride.name}: {note}" for ride in rides for note in ride.notes]
         remarks += [f"bench of {path}: {note}" for path, runs in benches.items() for note in decisions(tuple(runs))]
-        screen.table(ride_records_table(rides))
+        screen.details(ride_records_table(rides))
         screen.points(remarks)
         guided, call = fit_arguments(car, rides, benches, how, guide)
         comparison = _compared(screen, guided, forms, rides, call) if forms else None

@@ -113,10 +113,12 @@ class AbstractDamper(Module):
         By default the combined traits of the laws inside, but without linearity in the parameters and without states
         that may be extrapolated, since these depend on the outer law.
         """
-        inside = [law.traits() for law in self.inner_laws()]
+        inside, constant = [law.traits() for law in self.inner_laws()], bool(self.constant_forces())
         if not inside:
-            return Traits()
-        return combined_traits(inside)._replace(extrapolable_states=False, linear_in_parameters=False)
+            return Traits(contains_offset=constant)
+        both = combined_traits(inside)
+        constant |= both.contains_offset
+        return both._replace(extrapolable_states=False, linear_in_parameters=False, contains_offset=constant)
 
     def at_temperature(self, temperature: ScalarLike) -> "AbstractDamper":
         """This law with its oil at a known temperature [K]; by default with the laws inside at this temperature.
@@ -167,7 +169,7 @@ class AbstractDamper(Module):
         """Own parameters whose only part, or a common part of whose numbers, is a force that never changes [N].
 
         A zero error of the load cell has the same effect, so that a fit with one gives these no part of it. A law whose
-        static force has a meaning of its own, such as a gas charge, names none.
+        static force has a meaning of its own, such as a gas charge, names none and has the trait `contains_offset`.
         """
         return ()
 
@@ -264,7 +266,7 @@ class AbstractStateless(AbstractDamper):
         """No states; linear in the parameters declared as linear, unless there are laws inside."""
         inside = self.inner_laws()
         feed_through = not inside or any(law.traits().has_feed_through for law in inside)
-        offset = any(law.traits().contains_offset for law in inside)
+        offset = bool(self.constant_forces()) or any(law.traits().contains_offset for law in inside)
         temperature = any(law.traits().temperature_dependent for law in inside)
         return Traits(
             feed_through,

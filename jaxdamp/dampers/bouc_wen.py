@@ -13,7 +13,6 @@ from jaxdamp.dampers._guesses import sliding_fit
 from jaxdamp.dampers._states import own_states
 from jaxdamp.dampers._steps import direction
 from jaxdamp.dampers.base import AbstractDamper
-from jaxdamp.dampers.contract import Traits
 from jaxdamp.dampers.dahl import Dahl
 from jaxdamp.dampers.linear import Linear
 from jaxdamp.parameters import interval, nonnegative, parameter, positive, real
@@ -111,10 +110,6 @@ class BoucWen(AbstractDamper):
     )
     exponent: Number = parameter("", "n, sharpness of the knee", interval(1.0, 20.0), default=2.0, adjustable=False)
     static_force: Number = parameter("N", "f₀, force at rest at stroke zero", real, default=0.0)
-
-    def traits(self) -> Traits:
-        """The static force is an offset."""
-        return super().traits()._replace(contains_offset=True)
 
     def constant_forces(self) -> tuple[str, ...]:
         """The static force."""

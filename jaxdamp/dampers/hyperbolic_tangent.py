@@ -8,7 +8,6 @@ import numpy as np
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers._guesses import secant_rate
 from jaxdamp.dampers.base import AbstractStateless
-from jaxdamp.dampers.contract import Traits
 from jaxdamp.parameters import nonnegative, parameter, positive, real, setting
 
 
@@ -34,10 +33,6 @@ class HyperbolicTangent(AbstractStateless):
     branch_offset: Number = parameter("", "δ, offset of the two branches", real, adjustable=False)
     static_force: Number = parameter("N", "f₀, force at rest at stroke zero", real, default=0.0)
     stroke_width: Number = setting("m", "w, stroke over which the sign of x changes", positive, default=1e-3)
-
-    def traits(self) -> Traits:
-        """The static force is an offset."""
-        return super().traits()._replace(contains_offset=True)
 
     def constant_forces(self) -> tuple[str, ...]:
         """The static force."""

@@ -9,11 +9,8 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._limits import at_least, at_most, within
-from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
-from jaxdamp.dampers.base import AbstractMemoryless
-from jaxdamp.dampers.contract import Traits
-from jaxdamp.dampers.table import Table, check_points, refuse_active
-from jaxdamp.parameters import as_float, increasing, parameter, setting
+from jaxdamp._types import Scalar, ScalarLike, VectorLike
+from jaxdamp.dampers.table import AbstractPoints, Table, checked_points
 
 
 def monotone_slopes(gaps: Float[Array, " gaps"], secants: Float[Array, " gaps"]) -> Float[Array, " gaps+1"]:
@@ -41,7 +38,7 @@ def monotone_slopes(gaps: Float[Array, " gaps"], secants: Float[Array, " gaps"])
 
 
 @final
-class SplineTable(AbstractMemoryless):
+class SplineTable(AbstractPoints):
     """Monotone cubics between the points (vₖ, Fₖ), as PCHIP; outside, the end slopes continue.
 
     The slope is continuous, so the force has no kinks; the curve is monotone between points and never overshoots them.
@@ -63,26 +60,8 @@ class SplineTable(AbstractMemoryless):
     [0.0, 233.599, 500.0, 2130.0]
     """
 
-    velocity: Vector = setting("m/s", "velocities of the points", increasing)
-    force_points: Vector = parameter("N", "forces at the points")
-
     def __init__(self, velocity: VectorLike, force: VectorLike, *, allow_active: bool = False) -> None:
-        self.velocity = as_float(velocity, "velocity")
-        self.force_points = as_float(force, "force")
-        check_points(self.velocity, self.force_points)
-        if not allow_active:
-            refuse_active(self.velocity, self.force_points)
-
-    def __check_init__(self) -> None:
-        check_points(self.velocity, self.force_points)
-
-    def traits(self) -> Traits:
-        """The points may all move by one force."""
-        return super().traits()._replace(contains_offset=True)
-
-    def constant_forces(self) -> tuple[str, ...]:
-        """The points may all move by one force."""
-        return ("force_points",)
+        self.velocity, self.force_points = checked_points(velocity, force, allow_active=allow_active)
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""

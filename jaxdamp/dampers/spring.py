@@ -26,8 +26,8 @@ class Spring(AbstractStateless):
     preload: Number = parameter("N", "f₀, force at rest at stroke zero", linear=True, default=0.0)
 
     def traits(self) -> Traits:
-        """Independent of the velocity; the preload is an offset."""
-        return super().traits()._replace(has_feed_through=False, contains_offset=True)
+        """Independent of the velocity."""
+        return super().traits()._replace(has_feed_through=False)
 
     def constant_forces(self) -> tuple[str, ...]:
         """The preload."""

@@ -11,7 +11,6 @@ from jaxdamp._guesses import Elsewhere
 from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
 from jaxdamp.dampers._guesses import velocity_grid
 from jaxdamp.dampers.base import AbstractMemoryless
-from jaxdamp.dampers.contract import Traits
 from jaxdamp.dampers.piecewise_linear import hinges
 from jaxdamp.parameters import as_float, increasing, parameter, setting
 
@@ -64,8 +63,31 @@ def refuse_active(velocity: Array, force: Array) -> None:
         _checks.refuse("force", must, value, remedy)
 
 
+def checked_points(velocity: VectorLike, force: VectorLike, *, allow_active: bool) -> tuple[Array, Array]:
+    """The points of a curve as arrays; active ones are refused unless they are allowed."""
+    v, f = as_float(velocity, "velocity"), as_float(force, "force")
+    check_points(v, f)
+    if not allow_active:
+        refuse_active(v, f)
+    return v, f
+
+
+class AbstractPoints(AbstractMemoryless):
+    """A curve through points (vₖ, Fₖ)."""
+
+    velocity: Vector = setting("m/s", "velocities of the points", increasing)
+    force_points: Vector = parameter("N", "forces at the points")
+
+    def __check_init__(self) -> None:
+        check_points(self.velocity, self.force_points)
+
+    def constant_forces(self) -> tuple[str, ...]:
+        """The points may all move by one force."""
+        return ("force_points",)
+
+
 @final
-class Table(AbstractMemoryless):
+class Table(AbstractPoints):
     """Straight lines between the points (vₖ, Fₖ); outside, the end slopes continue.
 
     Arguments:
@@ -82,28 +104,12 @@ class Table(AbstractMemoryless):
     [350.0, 1300.0, 2200.0]
     """
 
-    velocity: Vector = setting("m/s", "velocities of the points", increasing)
     force_points: Vector = parameter("N", "forces at the points", linear=True)
 
     from_csv = Elsewhere("`jaxdamp.bench.read_table(path).law()`")
 
     def __init__(self, velocity: VectorLike, force: VectorLike, *, allow_active: bool = False) -> None:
-        self.velocity = as_float(velocity, "velocity")
-        self.force_points = as_float(force, "force")
-        check_points(self.velocity, self.force_points)
-        if not allow_active:
-            refuse_active(self.velocity, self.force_points)
-
-    def __check_init__(self) -> None:
-        check_points(self.velocity, self.force_points)
-
-    def traits(self) -> Traits:
-        """The points may all move by one force."""
-        return super().traits()._replace(contains_offset=True)
-
-    def constant_forces(self) -> tuple[str, ...]:
-        """The points may all move by one force."""
-        return ("force_points",)
+        self.velocity, self.force_points = checked_points(velocity, force, allow_active=allow_active)
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""

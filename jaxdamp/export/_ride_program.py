@@ -1,19 +1,23 @@
 """A vehicle with a law, and its ride metrics, as functions of their numbers, which the explorer computes."""
 
+import dataclasses
 from functools import cached_property
 
 import equinox as eqx
+import jax
+import numpy as np
+from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, PyTree
 
 from jaxdamp import _checks
 from jaxdamp.codegen import Program, Symbols, symbols
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.export._law_program import LawProgram
+from jaxdamp.export._law_program import LawNumber, LawProgram
 from jaxdamp.export._prepared_program import FlatTree, Numbers
 from jaxdamp.export._vehicle_program import VehicleProgram, road_input
 from jaxdamp.parameters import get, modules_inside, with_values
 from jaxdamp.simulation import MetricObserver
-from jaxdamp.vehicles import AbstractVehicle, refuse_controller
+from jaxdamp.vehicles import AbstractVehicle, Drawing, matrix, refuse_controller
 
 
 class RideProgram(VehicleProgram):
@@ -28,7 +32,7 @@ class RideProgram(VehicleProgram):
         count: number of the instants of a run.
 
     Attributes:
-        numbers: parameters and settings of the vehicle but those of the law.
+        numbers: parameters and settings of the vehicle but those of the law; "fixed" if they place points and wheels.
         metrics: the ride metrics that a run gathers.
     """
 
@@ -42,6 +46,7 @@ class RideProgram(VehicleProgram):
             _checks.refuse("vehicle", "hold the law as a damper", repr(type(vehicle).__name__), remedy)
         self.law = law
         self.numbers = [n for n in self.numbers if not any(n.path.startswith(prefix) for prefix in self._places)]
+        self.numbers = [dataclasses.replace(n, kind="fixed") if moves else n for n, moves in self._that_place()]
         self.metrics = [m for m in vehicle.ride_metrics if not m.statistic.needs_record]
         self.dt, self.count = dt, count
 
@@ -98,6 +103,24 @@ class RideProgram(VehicleProgram):
 
         return self._lowered(end, self._observed_so_far)
 
+    @cached_property
+    def drawing(self) -> Drawing:
+        """How the vehicle is drawn in motion."""
+        return Drawing(self.vehicle.frame(), [channel.name for channel in self.channels])
+
+    @cached_property
+    def moving(self) -> Program:
+        """`moving(m, c, h, r)`: the coordinates [m, rad], then the forces of the dampers that are drawn [N]."""
+        places = [channel.name for channel in self.channels]
+        chosen = np.array([places.index(force) for force in self.drawing.forces], int)
+
+        def moving(held: list[Array], motion: Array, *point: PyTree) -> list[Array]:
+            _, outputs = self._observed(self._equations(held), motion, *point)
+            return [motion[: len(self.layout.coordinates)], outputs[chosen]]
+
+        motion, states, *road = self._point(of="c")
+        return self._lowered(moving, motion, states, *road)
+
     def vehicle_of(self, values: Numbers) -> AbstractVehicle:
         """The vehicle with other numbers, those of the law and its own."""
         of_law, of_vehicle = values
@@ -111,6 +134,18 @@ class RideProgram(VehicleProgram):
     @property
     def _observed_so_far(self) -> list[Symbols]:
         return self._gathered.symbols("g", self.dtype)
+
+    def _that_place(self) -> list[tuple[LawNumber, bool]]:
+        """The numbers of the vehicle, and whether they place its points or its wheels."""
+
+        def places(values: list[Array]) -> PyTree[Array]:
+            frame = self.vehicle_of(([number.value for number in self.law.numbers], values)).frame()
+            points = [*(link.extension for link in frame.links), *(wheel.point for wheel in frame.wheels)]
+            return matrix(points, frame.coordinates), [(wheel.behind, wheel.left) for wheel in frame.wheels]
+
+        values = [number.value for number in self.numbers]
+        changes = jax.tree.leaves(jax.jit(jax.jacfwd(lambda v: ravel_pytree(places(v))[0]))(values))
+        return [(number, bool(np.any(change))) for number, change in zip(self.numbers, changes, strict=True)]
 
     def _observer(self, held: list[Array]) -> MetricObserver:
         return MetricObserver(self._equations(held), self.metrics, self.dt, self.count)

@@ -119,9 +119,9 @@ class VehicleProgram(PreparedProgram):
     def _equations(self, held: list[Array]) -> Equations:
         return self._stepper.tree(held).equations
 
-    def _point(self, d: str = "") -> tuple[PyTree[Symbols], ...]:
-        """The states and the road: motion, the states of each element, heights, rates."""
-        names = symbols(f"{d}x", (len(self.states),), self.dtype).names
+    def _point(self, d: str = "", of: str = "x") -> tuple[PyTree[Symbols], ...]:
+        """The states, from the array `of`, and the road: motion, the states of each element, heights, rates."""
+        names = symbols(f"{d}{of}", (len(self.states),), self.dtype).names
         motion, *states = np.split(names, np.cumsum([2 * len(self.layout.coordinates), *self._state_sizes])[:-1])
         return Symbols(motion, self.dtype), [Symbols(s, self.dtype) for s in states], *self._road(f"{d}h", f"{d}r")
 

@@ -15,7 +15,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._tables import Contents
-from jaxdamp._words import class_words, first_upper, metric_words
+from jaxdamp._words import class_words, first_upper, in_words, metric_words
 from jaxdamp._writing import write_whole
 from jaxdamp.bench import BenchRun
 from jaxdamp.codegen import JavaScript, PrintedFunction, Program, lower, symbols
@@ -25,8 +25,8 @@ from jaxdamp.export._ride_program import RideProgram
 from jaxdamp.export.module_file import to_json
 from jaxdamp.parameters import weight
 from jaxdamp.roads import AbstractRoad, cosine_bump, iso8608
-from jaxdamp.simulation import Ride
-from jaxdamp.vehicles import AbstractVehicle, presets
+from jaxdamp.simulation import Ride, axle_timing
+from jaxdamp.vehicles import UNKNOWN_SPEED, AbstractVehicle, Point, drawing_script, matrix, presets
 
 
 _LANGUAGE = JavaScript()
@@ -51,6 +51,7 @@ def vehicle_functions(vehicle: RideProgram) -> dict[str, str]:
         "step": _filled("step(m, c, h0, r0, h1, r1)", vehicle.step, "c"),
         "observe": _filled("observe(m, c, g, h, r)", vehicle.observe, "g"),
         "end": _filled("end(m, g, y)", vehicle.end, "y"),
+        "moving": _filled("moving(m, c, h, r, y)", vehicle.moving, "y"),
     }
 
 
@@ -110,17 +111,18 @@ def to_explorer(
     """Write a law as one HTML file that shows what its parameters do, in any browser, without server or network.
 
     Sliders move the parameters of the law and of the vehicle. At once the page shows force over velocity and over
-    stroke, in sines or under the motion of a record with RMSE and fit; a ride on a road, with the metrics of `Ride`,
-    spectra and channels beside the baseline. A CSV dropped onto the page is another record. "Save law as JSON" gives
-    a file that `from_json` reads. Law, step of the vehicle and metrics are functions of this library, printed as
-    JavaScript: the numbers are those of `respond` and `Ride` to rounding.
+    stroke, in sines or under the motion of a record with RMSE and fit; a ride on a road, with the car in motion, the
+    metrics of `Ride`, spectra and channels beside the baseline. A CSV dropped onto the page is another record. "Save
+    law as JSON" gives a file that `from_json` reads. Law, step of the vehicle and metrics are functions of this
+    library, printed as JavaScript: the numbers are those of `respond` and `Ride` to rounding.
 
     Arguments:
         law: any law or composition.
         path: the file to write, NAME.html; an existing one is replaced, and never left incomplete.
         records: bench records to overlay, such as `bench.read(...)`. Of long ones the page takes every so many-th
             sample, and says so.
-        vehicle: a vehicle with one wheel that holds the law as a damper; `presets.quarter_car_000(law)` if left out.
+        vehicle: a vehicle that holds the law as a damper, or as several; `presets.quarter_car_000(law)` if left out.
+            Axles follow each other at the speed of the road. What places the wheels, such as the wheelbase, is fixed.
         road: the class of ISO 8608 that the page begins with, "A" to "H"; or a road, which can be chosen beside them.
         speed: at which random roads are driven at first [m/s].
         baseline: what the law is compared with; the law itself, as it is here, if left out.
@@ -131,7 +133,7 @@ def to_explorer(
         The path of the file.
 
     Raises:
-        ValueError: a folder that does not exist, a vehicle of several wheels or without the law, what a `Ride` refuses.
+        ValueError: a folder that does not exist, a vehicle without the law, what a `Ride` refuses.
         NotImplementedError: an operation of the law that cannot be printed; the message names it.
     """
     check_module("law", law, (AbstractDamper,), "to_explorer(law, path)")
@@ -139,7 +141,7 @@ def to_explorer(
     if file.suffix != ".html":
         _checks.refuse("path", "be a file NAME.html", str(file))
     vehicle = presets.quarter_car_000(law) if vehicle is None else vehicle
-    _check_vehicle(vehicle)
+    check_module("vehicle", vehicle, (AbstractVehicle,), "to_explorer(law, path, vehicle=QuarterCar(..., damper=law))")
     _checks.positive("speed", speed)
     profile = road if isinstance(road, AbstractRoad) else None
     duration = (profile and profile.duration) or 10.0 if duration is None else duration
@@ -182,15 +184,11 @@ def _of_profile(road: AbstractRoad | str, ride: Ride) -> Contents:
     if isinstance(road, str):
         return {}
     assert ride.heights is not None
-    return {"profile": {"title": f"given road ({class_words(road)})", "heights": _packed(ride.heights[:, 0])}}
-
-
-def _check_vehicle(vehicle: AbstractVehicle) -> None:
-    check_module("vehicle", vehicle, (AbstractVehicle,), "to_explorer(law, path, vehicle=QuarterCar(..., damper=law))")
-    wheels = len(vehicle.wheel_names)
-    if wheels != 1:
-        must = "be a vehicle with one wheel"
-        _checks.refuse("vehicle", must, f"a {type(vehicle).__name__} with {wheels}", "Take a `QuarterCar`.")
+    timing = axle_timing(ride.vehicle, road)
+    driven = timing.kind in ("one axle", "delayed")
+    speed = {"known": road.speed is not None, "speed": UNKNOWN_SPEED if road.speed is None else float(road.speed)}
+    heights = [_packed(column) for column in np.asarray(ride.heights).T]
+    return {"profile": {"title": f"given road ({class_words(road)})", "heights": heights, "driven": driven, **speed}}
 
 
 def _of_car(car: RideProgram) -> Contents:
@@ -200,11 +198,23 @@ def _of_car(car: RideProgram) -> Contents:
         {"name": name, "title": metric_words(name), "unit": vehicle.units[name], "meaning": vehicle.descriptions[name]}
         for name in car.needed
     ]
+    about = {
+        "title": class_words(vehicle),
+        "numbers": [_of_number(number) for number in car.numbers],
+        "fixed": [in_words(number.path) for number in car.numbers if number.kind == "fixed"],
+        "behind": [float(wheel.behind) for wheel in vehicle.frame().wheels],
+    }
     return {
-        "vehicle": {"title": class_words(vehicle), "numbers": [_of_number(number) for number in car.numbers]},
+        "vehicle": about,
+        "drawing": car.drawing.parts | {"heights": [_row(point, vehicle) for point in car.drawing.heights]},
         "metrics": [_of_metric(metric, vehicle) for metric in car.metrics],
         "channels": channels,
     }
+
+
+def _row(point: Point, vehicle: AbstractVehicle) -> list[float]:
+    """The coefficients of a point, by the coordinates in their order."""
+    return np.asarray(matrix([point], vehicle.layout.coordinates))[0].tolist()
 
 
 def _assembled(data: Contents, programs: str) -> str:
@@ -215,7 +225,7 @@ def _assembled(data: Contents, programs: str) -> str:
         "version": importlib.metadata.version("jaxdamp"),
         "data": json.dumps(data, allow_nan=False).replace("<", "\\u003c"),
         "programs": programs,
-        "scripts": "\n".join(text[name] for name in _SCRIPTS),
+        "scripts": "\n".join([drawing_script(), *(text[name] for name in _SCRIPTS)]),
     }
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], text["page.html"])
 

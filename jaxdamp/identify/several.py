@@ -70,7 +70,7 @@ def search_from(problem: Problem, *, starts: int | None, max_steps: int, solver:
     best = search(problem, max_steps, solver=solver)
     ends, tried = [best], [np.asarray(problem.free.values)]
     for _ in range(ROUNDS):
-        if best.finite and problem.is_rounding(best.squares):
+        if len(tried) == starts or (best.finite and problem.is_rounding(best.squares)):
             break
         others = _not_among(tried, other_starts(problem.free, problem.reach))
         others = others[: None if starts is None else starts - len(tried)]

@@ -24,8 +24,7 @@ from jaxdamp.identify.noise import Noise, channel_noise
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd, Solver, search
 from jaxdamp.identify.several import Solution, search_scattered
-from jaxdamp.identify.vehicle_friction import friction_left_out
-from jaxdamp.identify.vehicle_left_out import on_free_scale, on_sensors, on_signs, on_units
+from jaxdamp.identify.vehicle_left_out import friction_left_out, on_free_scale, on_sensors, on_signs, on_units
 from jaxdamp.identify.vehicle_preparing import (
     FreeScale,
     VehicleData,

@@ -1,25 +1,31 @@
-"""Effects that a fit of a vehicle left out: a sensor that is late, shifted, scaled or reversed, and a free scale.
+"""Effects that a fit of a vehicle left out: a sensor that is late, shifted, scaled or reversed, friction, a free scale.
 
 A sensor that is late, shifted or scaled leaves the slope of its channel, a constant, or the channel in the residual.
+Friction, dry or such that gives before it slides, is put into the fitted vehicle and its channels are computed anew.
 """
 
+import dataclasses
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from jaxdamp.bench import RideRecord
 from jaxdamp.identify.model import VehicleTest
 from jaxdamp.identify.noise import channel_noise
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
+from jaxdamp.identify.vehicle_ladder import Place, friction_places, with_laws
 from jaxdamp.identify.vehicle_preparing import FreeScale
 from jaxdamp.identify.vehicle_residuals import RideBatch
-from jaxdamp.identify.vehicle_result import ChannelScore
+from jaxdamp.identify.vehicle_result import ChannelScore, predicted
 from jaxdamp.parameters import get
 from jaxdamp.rig import Sensor
 
 
+GIVES = (1e-4, 3e-4, 1e-3)  # m, that friction gives before it slides
+CLEARLY = 0.7  # of the squares left without it: friction that leaves less is named, and so are forms among each other
 SURE = 6.0  # standard errors from which an effect is named
 NOTICEABLE = 0.01  # sampling intervals of a delay, and tenths of a channel, below which an effect does not matter
 REVERSED = -0.3  # correlation of a channel with its prediction below which its sign is doubted
@@ -107,19 +113,12 @@ def on_sensors(
                 if column is not None:
                     effects.append((channel, effect))
                     columns.append(column)
-    if not columns:
+    found = _regressed(problem, end, columns)
+    if found is None:
         return []
-    whole = np.stack([*columns, end.residual], axis=1)
-    basis, _ = np.linalg.qr(end.jacobian / np.linalg.norm(end.jacobian, axis=0).clip(1e-300))
-    rest = whole - basis @ (basis.T @ whole)
-    shown = np.linalg.norm(rest[:, :-1], axis=0) > OF_ITS_OWN * np.linalg.norm(whole[:, :-1], axis=0)
-    inverse = np.linalg.pinv(rest[:, :-1][:, shown])
-    sizes = inverse @ rest[:, -1]
-    left = channel_noise(problem, rest[:, -1] - rest[:, :-1][:, shown] @ sizes, end.values.size)
-    errors = np.linalg.norm(inverse * left.sigma, axis=1)
-    chosen = [effect for effect, own in zip(effects, shown, strict=True) if own]
+    chosen = [effect for effect, own in zip(effects, found.shown, strict=True) if own]
     sentences = []
-    for (channel, effect), size, error in zip(chosen, map(float, sizes), errors, strict=True):
+    for (channel, effect), size, error in zip(chosen, map(float, found.sizes), found.errors, strict=True):
         values = np.concatenate([record[channel] for record in records if channel in record.channels])
         unit = {"delay": records[0].dt, "offset": 0.1 * float(np.std(values)), "gain": 0.1}[effect]
         if abs(size) > max(SURE * error, NOTICEABLE * unit):
@@ -162,3 +161,91 @@ def _sentence(channel: str, effect: str, size: float, unit: str) -> str:
         f"By its residual, {channel} {words[effect]}, unless the vehicle misses something else:"
         f" fit the {how} of its sensor."
     )
+
+
+class _Regression(NamedTuple):
+    """A residual regressed on effects, after both are freed of what the fitted numbers can explain."""
+
+    shown: Bool[np.ndarray, " effects"]  # which effects are not like fitted numbers
+    sizes: Float[np.ndarray, " shown"]  # of these
+    errors: Float[np.ndarray, " shown"]  # their standard errors
+    left: float  # share of the squares that they leave
+
+
+def _regressed(problem: Problem, end: SearchEnd, effects: Sequence[np.ndarray]) -> _Regression | None:
+    """The sizes of effects by their columns, the change of the weighted residual for each unit; None if none shows."""
+    columns = np.stack(effects, axis=1) if effects else np.zeros((0, 0))
+    if not columns.size or not np.all(np.isfinite(columns)):
+        return None
+    basis, _ = np.linalg.qr(end.jacobian / np.linalg.norm(end.jacobian, axis=0).clip(1e-300))
+    own, rest = (a - basis @ (basis.T @ a) for a in (columns, end.residual))
+    shown = np.linalg.norm(own, axis=0) > OF_ITS_OWN * np.linalg.norm(columns, axis=0)
+    if not shown.any():
+        return None
+    inverse = np.linalg.pinv(own[:, shown])
+    sizes = inverse @ rest
+    left = rest - own[:, shown] @ sizes
+    errors = np.linalg.norm(inverse * channel_noise(problem, left, end.values.size).sigma, axis=1)
+    return _Regression(shown, sizes, errors, float(left @ left) / max(float(rest @ rest), 1e-300))
+
+
+class Friction(NamedTuple):
+    """Friction that explains a residual."""
+
+    places: tuple[Place, ...]  # where it is
+    give: float | None  # that it gives before it slides [m]; None for dry friction
+    left: float  # share of the squares of the residual that it leaves, beside all fitted numbers
+    columns: Float[np.ndarray, "samples places"]  # change of the weighted residual by it, for each place
+
+    @property
+    def sentence(self) -> str:
+        """What to do about it."""
+        where, had = " and ".join(place.path for place in self.places), self.places[0].friction
+        ladder = "compare with `identify.friction_ladder(vehicle)`"
+        if self.give is None:
+            what = f"there is dry friction at {where} that the vehicle has not"
+        else:
+            what = f"the friction at {where} gives before it slides, by about {1e3 * self.give:.2g} mm"
+            what += f", which {type(had).__name__} does not" if had is not None else ""
+        return f"By its residual, {what}: {100 * (1 - self.left):.0f} % of the squared error; {ladder}."
+
+
+def friction_left_out(problem: Problem, end: SearchEnd) -> Friction | None:
+    """The friction that the residual at the end of a fit shows; None if it shows none.
+
+    Of dry friction and friction that gives by 0.1, 0.3 or 1 mm that with the least squares is named, friction that
+    gives only where it leaves clearly less than dry friction.
+    """
+    places = [place for place in friction_places(problem.free.tree.vehicle) if place.could_give]
+    dry = _friction(problem, end, places, None) if all(place.friction is None for place in places) else None
+    giving = [one for give in GIVES if (one := _friction(problem, end, places, give)) is not None]
+    best = min(giving, key=lambda friction: friction.left, default=None)
+    if dry is not None and (best is None or best.left > CLEARLY * dry.left):
+        best = dry
+    return best if best is not None and best.left < CLEARLY else None
+
+
+def _friction(problem: Problem, end: SearchEnd, places: Sequence[Place], give: float | None) -> Friction | None:
+    """Friction of one form where the residual shows it for sure."""
+    form, model = "coulomb" if give is None else "dahl", problem.free.tree
+    changes = []
+    for place in places:
+        changed = with_laws(model.vehicle, [place], [place.with_form(form, give)])
+        changes.append(_residual(problem, dataclasses.replace(model, vehicle=changed)) - end.residual)
+    found = _regressed(problem, end, changes)
+    sure = [] if found is None else np.flatnonzero(found.shown)[-found.sizes > SURE * found.errors]
+    if found is None or not len(sure):
+        return None
+    return Friction(tuple(places[i] for i in sure), give, found.left, np.stack(changes, axis=1)[:, sure])
+
+
+def _residual(problem: Problem, model: VehicleTest) -> Float[np.ndarray, " samples"]:
+    """The weighted residual of the records of motion with another vehicle; that of bench records does not change."""
+    parts = list[np.ndarray]()
+    for part in problem.residuals:
+        if isinstance(part, RideBatch):
+            missed = (np.asarray(predicted(part, model)) - np.asarray(part.measured)) * np.asarray(part.weight)
+            parts.append(missed.ravel())
+        else:
+            parts.append(np.asarray(part(problem.free.tree)))
+    return np.concatenate(parts)

@@ -7,11 +7,6 @@ Fits, tables, plot labels and reports all read that one declaration. A *path* su
 parameter inside a composition. Freezing, ties and extra bounds are arguments of a fit or of a tuning, never of the law.
 """
 
-from jaxdamp.parameters._checking import (
-    AbstractDeclared as AbstractDeclared,
-    check_parameters as check_parameters,
-    checked as checked,
-)
 from jaxdamp.parameters._coordinates import Bounds as Bounds, Coordinates as Coordinates
 from jaxdamp.parameters._declaration import (
     Module as Module,
@@ -40,6 +35,9 @@ from jaxdamp.parameters._domains import (
 )
 from jaxdamp.parameters._free import FreeParameters as FreeParameters, free_parameters
 from jaxdamp.parameters._paths import (
+    AbstractDeclared as AbstractDeclared,
+    check_parameters as check_parameters,
+    checked as checked,
     get,
     match_paths as match_paths,
     matched_in_words as matched_in_words,

@@ -10,38 +10,19 @@ from jaxdamp._display import display
 from jaxdamp._tables import typeset_unit
 from jaxdamp._types import Axes
 from jaxdamp.plots import _rides, _sheet, _style, fitted_range
+from jaxdamp.plots._sketch import sketch
 from jaxdamp.plots.damping import ratios, wheel_axis
 from jaxdamp.rig import quasi_static
 from jaxdamp.roads import assess_roughness, class_limits, road_class
 
 
 _MM, _BINS, _MOST_BARS = 1e3, 31, 6
+_NOTE: _style.Look = {"fontsize": 6.5, "va": "center", "bbox": {"facecolor": "white", "linewidth": 0.0, "pad": 0.4}}
 
 
 def vehicle(axes: Axes, shown: _rides.Rides) -> None:
-    """Bodies on springs and dampers on wheels, with masses and rates."""
-    from matplotlib.patches import Rectangle
-
-    _sheet.blank(axes)
-    frame, blue = shown.cars[1].frame(), _style.AFTER["color"]
-    small = {"fontsize": 6.5, "va": "center"}
-    axes.add_patch(Rectangle((0.05, 0.68), 0.9, 0.26, facecolor="0.92", edgecolor=_style.BLACK))
-    body = f"body {_style.short(float(frame.main_body.mass))} kg"
-    axes.text(0.5, 0.81, body, ha="center", va="center", fontsize=_sheet.SMALL)
-    others = [one for one in frame.bodies if one is not frame.main_body]
-    pairs = list(zip(frame.wheels, frame.links, strict=False))[:3]
-    places = np.linspace(0.5 / len(pairs), 1.0 - 0.5 / len(pairs), len(pairs)) if pairs else []
-    for number, (x, (wheel, link)) in enumerate(zip(places, pairs, strict=True)):
-        turns = x - 0.04 + 0.014 * np.array([0, 0, 1, -1, 1, -1, 1, 0, 0])
-        axes.plot(turns, np.linspace(0.34, 0.68, 9), color=_style.BLACK, linewidth=1.0)
-        axes.plot([x + 0.04] * 2, [0.34, 0.68], color=blue, linewidth=1.5)
-        axes.plot([x + 0.04] * 2, [0.46, 0.56], color=blue, linewidth=6.0, solid_capstyle="butt")
-        axes.plot(x, 0.2, "o", markersize=26, markerfacecolor="white", color=_style.BLACK)
-        axes.text(x - 0.07, 0.51, f"{_style.short(1e-3 * float(link.stiffness))} N/mm", ha="right", **small)
-        mass = f"{_style.short(float(others[number].mass))} kg, " if number < len(others) else ""
-        tyre = f"{mass}tyre\n{_style.short(1e-3 * float(wheel.stiffness))} N/mm"
-        axes.text(x + 0.075, 0.2, tyre, ha="left", **small)
-    axes.axhline(0.03, color=_style.BLACK, linewidth=1.0)
+    """The sketch of the vehicle under its natural frequencies."""
+    sketch(axes, shown.cars[1])
     frequencies = [_style.short(float(f)) for f in shown.frequencies]
     axes.set_title(f"Natural frequencies {', '.join(frequencies[:6])} Hz", loc="left")
 
@@ -94,8 +75,9 @@ def plane(axes: Axes, shown: _rides.Rides) -> None:
     else:
         axes.plot(*curve, color=_style.GREY, linewidth=1.2, marker=".", markersize=4, label="constant damping")
         for at, word in ((0, "soft"), (-1, "firm")):
-            place, small = (curve[0][at], curve[1][at]), {"color": _style.GREY, "fontsize": _sheet.SMALL}
-            axes.annotate(word, place, (4, 3), textcoords="offset points", **small)
+            place, left = (curve[0][at], curve[1][at]), curve[0][at] < np.mean(curve[0])
+            look = {"color": _style.GREY, "fontsize": _sheet.SMALL, "ha": "right" if left else "left"}
+            axes.annotate(word, place, (-5 if left else 5, 3), textcoords="offset points", **look)
     places = [(_mean(side, comfort), _mean(side, grip)) for side in shown.values]
     if not shown.single:
         arrow = {"arrowstyle": "-|>", "color": _style.AFTER["color"], "linewidth": 1.4, "shrinkA": 5, "shrinkB": 6}
@@ -105,9 +87,8 @@ def plane(axes: Axes, shown: _rides.Rides) -> None:
     axes.plot(*places[1], **_style.BEST, label=label, linestyle="")
     _limits(axes, shown, comfort, grip)
     units = [typeset_unit(shown.units[names[0]]) for names in (comfort, grip)]
-    x = f"less comfort →   {_style.metric_words(comfort[0])} [{units[0]}]"
-    y = f"less grip →   tyre load variation, RMS [{units[1]}]"
-    _style.dress(axes, x, y, "Comfort and grip")
+    x, y = f"{_style.metric_words(comfort[0])} [{units[0]}]", f"tyre load variation, RMS [{units[1]}]"
+    _style.dress(axes, x, y, "Comfort and grip: better to the left and down")
     axes.margins(0.12)
     axes.legend(frameon=False, loc="best")
 
@@ -167,7 +148,7 @@ def _bar(axes: Axes, shown: _rides.Rides, row: int, name: str) -> None:
         axes.plot([end, end], [row - 0.15, row + 0.35], color=_style.BAD, linewidth=2.0, zorder=4)
     values = " → ".join(_style.quantity(value, shown.units[name]) for value in (before, after))
     text = f"{_style.metric_words(name)}:  {values}, {_style.percent(change)}"
-    axes.text(0.01, row - 0.3, text, transform=axes.get_yaxis_transform(), fontsize=6.5, va="center", zorder=5)
+    axes.text(0.01, row - 0.3, text, transform=axes.get_yaxis_transform(), zorder=5, **_NOTE)
 
 
 def damper(panels: Sequence[Axes], shown: _rides.Rides, path: str) -> None:

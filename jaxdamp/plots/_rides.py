@@ -203,7 +203,7 @@ def quadrants(velocity: np.ndarray | None) -> str:
     low, high = np.abs(velocity) <= border, np.abs(velocity) > border
     shares = [100.0 * np.mean(side & speed) for side in (velocity > 0, velocity < 0) for speed in (low, high)]
     rebound, compression = (f"{a:.0f} % slow, {b:.0f} % fast" for a, b in (shares[:2], shares[2:]))
-    return f"Rebound {rebound}\ncompression {compression} (from {_style.short(1e3 * border)} mm/s)"
+    return f"Rebound {rebound} (> {_style.short(1e3 * border)} mm/s)\ncompression {compression}"
 
 
 def dips(shown: Rides) -> str:

@@ -47,10 +47,10 @@ def head(axes: Axes, name: str, sentence: str, facts: str, *, answer: str = "", 
     blank(axes)
     axes.text(0.0, 1.0, f"{_style.said(name)}   ·   {_style.said(facts)}"[:130], color=_style.GREY, **_TEXT)
     if answer:
-        axes.text(0.0, 0.79, answer, fontsize=14.0, fontweight="bold", color=colour, **_TEXT)
-        look, width, top = {"fontsize": 8.5}, 118, 0.46
+        axes.text(0.0, 0.83, answer, fontsize=14.0, fontweight="bold", color=colour, **_TEXT)
+        look, width, top = {"fontsize": 8.5}, 118, 0.52
     else:
-        look, width, top = {"fontsize": 10.5, "fontweight": "bold", "color": colour}, 80, 0.76
+        look, width, top = {"fontsize": 10.5, "fontweight": "bold", "color": colour}, 86, 0.76
     together = re.sub(r"(?<=\d) (?=[^\W\d]|%|±)|(?<=±) ", "\N{NO-BREAK SPACE}", _style.said(sentence))
     lines = textwrap.wrap(together, width)
     lines = [*lines[:2], f"{lines[2].rstrip(' ,;.')} …"] if len(lines) > 3 else lines

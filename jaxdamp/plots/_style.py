@@ -209,11 +209,17 @@ def dress(axes: Axes, x: str, y: str, title: str = "") -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
+def together(text: str) -> str:
+    """A sign in brackets stays with its word, (+ rebound), where a line is broken."""
+    return re.sub(r"(?<=\([+−]) ", "\N{NO-BREAK SPACE}", text)
+
+
 _SLACK = 0.35  # inch, by which a title or label may be longer than its axes
 
 
 def _wrap(text: "matplotlib.text.Text", axes: Axes) -> None:
     """Break a title or label where it is longer than its axes, as wide as these are when they are drawn."""
+    text.set_text(together(text.get_text()))
     text.set_wrap(True)
     vars(text)["_get_wrap_line_width"] = functools.partial(_longest, text, axes)  # by default the width of the figure
 
@@ -244,7 +250,7 @@ def few_ticks(axes: Axes, most: int) -> None:
             self.set_params(nbins=max(min(most, int(0.6 * axes.xaxis.get_tick_space())), 1))
             return super().tick_values(vmin, vmax)
 
-    axes.xaxis.set_major_locator(Ticks(steps=[1, 2, 2.5, 5, 10]))
+    axes.xaxis.set_major_locator(Ticks(steps=[1, 2, 2.5, 4, 5, 10]))
 
 
 def _rescale(axis: "matplotlib.axis.Axis", label: str) -> None:
@@ -261,7 +267,7 @@ def _rescale(axis: "matplotlib.axis.Axis", label: str) -> None:
             ends = sorted((shown(vmin), shown(vmax)))
             return np.sort(np.asarray(super().tick_values(*ends)) / shown.factor)
 
-    axis.set_major_locator(Ticks(nbins="auto", steps=[1, 2, 2.5, 5, 10]))
+    axis.set_major_locator(Ticks(nbins="auto", steps=[1, 2, 2.5, 4, 5, 10]))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{round(shown(value), 9) + 0.0:g}".replace("-", "−")))
     if shown.factor < 0.0:
         axis.set_inverted(True)

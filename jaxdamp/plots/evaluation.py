@@ -257,9 +257,7 @@ def _draw_limits(axes: Axes, limits: LimitCheck) -> list:
 
 def _dress(panels: Mapping[str, Axes]) -> None:
     _style.dress(panels["v"], _style.VELOCITY, _style.FORCE, "Continuous plot (CVP): mean cycles")
-    _style.dress(
-        panels["peaks"], _style.VELOCITY, _style.FORCE, "Peak-velocity plot (PVP), and forces at stated velocities"
-    )
+    _style.dress(panels["peaks"], _style.VELOCITY, _style.FORCE, "Peak-velocity plot (PVP)")
     _style.dress(panels["x"], _style.STROKE, _style.FORCE, "Force over stroke")
     _style.dress(panels["a"], "acceleration [m/s²]   (+ rebound)", _style.FORCE, "Force over acceleration")
     _style.dress(panels["t"], "time in the cycle, over its period [–]", _style.FORCE, "Force over time")

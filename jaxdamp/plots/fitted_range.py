@@ -43,7 +43,9 @@ def shade(axes: Axes, laws: Iterable[AbstractDamper], velocities: Points, label:
     for start, stop in _stretches(outside):
         low, high = velocities[max(start - 1, 0)], velocities[min(stop, velocities.size - 1)]
         name = "_nolegend_" if spans else label
-        spans.append(axes.axvspan(low, high, color=_style.SHADE, linewidth=0.0, zorder=0.1, label=name))
+        spans.append(
+            axes.axvspan(low, high, facecolor=_style.SHADE, edgecolor="0.7", linewidth=0.5, zorder=0.1, label=name)
+        )
     return spans[:1]
 
 

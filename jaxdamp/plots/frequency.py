@@ -133,8 +133,9 @@ def third_octaves(
         shade: _style.Look = {"facecolor": (style["color"], 0.3)} if filled else {}
         axes.stairs(rms[bands], ends, fill=filled, label=label, **look, **shade)
     axes.set_xscale("log")
-    title = f"{_style.first_upper(name)} by third octave, weighted by {weighting} (ISO 2631-1)"
-    _style.dress(axes, "frequency [Hz]", f"[{unit}]", title)
+    _style.dress(
+        axes, "frequency [Hz]", f"{name} [{unit}]", f"Third octaves, {weighting} of ISO\N{NO-BREAK SPACE}2631-1"
+    )
     _style.plain_log_axis(axes.xaxis)
 
 

@@ -81,6 +81,7 @@ def fit_loops(result: FitResult, runs: BenchRun | Sequence[BenchRun] | None = No
     return figure
 
 
+_SIGNS = {"sprung_acceleration": "up", "stroke": "rebound"}  # of channels, by the end of their names
 _MOST_LAWS = 12  # of small multiples
 
 
@@ -120,7 +121,7 @@ def loops_by_law(comparison: Comparison, record: str | None = None) -> Figure:
     for axes in panels.flat[len(shown) :]:
         axes.set_axis_off()
     for axes in panels.flat[max(len(shown) - columns, 0) : len(shown)]:
-        axes.set_xlabel(display().text(_style.VELOCITY))
+        axes.set_xlabel(_style.together(display().text(_style.VELOCITY)))
         axes.tick_params(labelbottom=True)
     judged = "on motion held out" if comparison.best.judged_on else "on the fitted records"
     few = f", the best {len(shown)} of {len(rungs)} laws" * (len(shown) < len(rungs))
@@ -173,15 +174,20 @@ def vehicle_fit(result: VehicleFit, record: str | None = None) -> Figure:
     _checks.one_of("record", name, names)
     shown = result.records[names.index(name)]
     fitted = result.respond(shown)
-    units = {score.channel: score.unit for score in result.scores if score.record == name}
-    figure = _style.new_figure(12.0, 1.0 + 2.2 * len(units))
-    rows = figure.subplots(len(units), 2, sharex=True, squeeze=False, width_ratios=(2.0, 1.0))
-    for (over, spectrum), (channel, unit) in zip(rows, units.items(), strict=True):
-        over.plot(shown.time, shown[channel], color=_style.GREY, linewidth=2.5, alpha=0.5, label="measured")
-        over.plot(shown.time, fitted[channel], color=_style.COLOURS[0], linewidth=0.9, label="fitted")
-        spectrum.plot(shown.time, fitted[channel] - shown[channel], color=_style.COLOURS[1], linewidth=0.6)
-        _style.dress(over, "", f"[{typeset_unit(unit)}]", _style.metric_words(channel))
-        _style.dress(spectrum, "", f"[{typeset_unit(unit)}]", "fitted − measured")
+    scores = [score for score in result.scores if score.record == name]
+    figure = _style.new_figure(12.0, 1.0 + 2.2 * len(scores))
+    rows = figure.subplots(len(scores), 2, sharex=True, squeeze=False, width_ratios=(2.0, 1.0))
+    for (over, residual), score in zip(rows, scores, strict=True):
+        factor, unit = (1e3, "mm") if score.unit == "m" else (1.0, typeset_unit(score.unit))
+        measured, computed = (factor * np.asarray(one[score.channel]) for one in (shown, fitted))
+        over.plot(shown.time, measured, color=_style.GREY, linewidth=2.5, alpha=0.5, label="measured")
+        over.plot(shown.time, computed, color=_style.COLOURS[0], linewidth=0.9, label="fitted")
+        residual.plot(shown.time, computed - measured, color=_style.COLOURS[1], linewidth=0.6)
+        sign = next((f"   (+ {side})" for end, side in _SIGNS.items() if score.channel.endswith(end)), "")
+        words = _style.first_upper(_style.metric_words(score.channel))
+        _style.dress(over, "", f"[{unit}]{sign}", f"{words}, fit {_style.short(score.fit_percent)} %")
+        error = f"fitted − measured, RMS {_style.quantity(score.rmse, score.unit)}"
+        _style.dress(residual, "", f"[{unit}]", error)
     for axes in rows[-1]:
         axes.set_xlabel("time [s]")
     _style.legend_above(figure, rows[0, 0].get_lines())

@@ -38,7 +38,7 @@ def ride_sheet(
         ValueError: no ride, an unknown metric in the limits.
     """
     if isinstance(rides, TuneResult):
-        shown, sentence = _rides.Rides.of_tuning(rides), sentence or rides.verdict.sentence
+        shown, sentence = _rides.Rides.of_tuning(rides), sentence or _without_answer(rides)
         good = _style.GOOD if rides.verdict.better else _style.BAD
         answer = {"answer": rides.verdict.outcome.value, "colour": good}
     else:
@@ -46,7 +46,7 @@ def ride_sheet(
         shown, answer = _rides.Rides.of_responses(by_name, limits), {}
     with _sheet.lettering():
         figure = _sheet.page()
-        rows = figure.add_gridspec(5, 1, height_ratios=(1.0, 1.9, 2.8, 4.0, 2.6), hspace=0.02)
+        rows = figure.add_gridspec(5, 1, height_ratios=(1.2, 1.9, 2.7, 3.9, 2.6), hspace=0.02)
         car = shown.cars[0]
         title = name or _style.first_upper("controlled " * (car.passive is not car) + _style.class_words(car.passive))
         top = figure.add_subplot(rows[0].subgridspec(1, 1)[0])
@@ -72,6 +72,13 @@ def ride_sheet(
             _ride_spectra.gains(last[:2], shown)
             _ride_spectra.comfort(last[2], shown)
     return figure
+
+
+def _without_answer(tuned: TuneResult) -> str:
+    """The sentence of the verdict without the answer, which stands above it."""
+    lead, _, rest = tuned.verdict.sentence.partition(": ")
+    said = tuned.verdict.outcome.value.startswith(lead) and rest
+    return _style.first_upper(_style.said(rest)) if said else tuned.verdict.sentence
 
 
 def _changes(shown: _rides.Rides) -> str:

@@ -25,6 +25,8 @@ def chain_report(
     tuned: TuneResult[Any] | None = None,
     *,
     title: str = "From bench records to a better damper",
+    sentences: Sequence[str] = (),
+    sheets: bool = True,
     evaluation: Evaluation | None = None,
     preflight: Preflight | None = None,
     runs: Sequence[BenchRun] | None = None,
@@ -40,6 +42,8 @@ def chain_report(
         rides: for each road, by its title, the responses by name; the first is compared with the others.
         tuned: of `tune.minimise`.
         title: of the page.
+        sentences: what else its verdict says.
+        sheets: one A4 page of the damper and one of the ride at the top.
         evaluation: of `bench.evaluate`.
         preflight: of `bench.preflight`.
         runs: the records in the order of the page; the fitted ones and those held out, if left out.
@@ -64,6 +68,7 @@ def chain_report(
     report.verdict(
         *([tuned.verdict.sentence] if tuned else []),
         best,
+        *sentences,
         *(f"{road}: {sentence}" for road, ride in rides.items() for sentence in ride_verdict(ride)),
         more=[
             *([tuned.ending] if tuned else []),
@@ -71,12 +76,8 @@ def chain_report(
             *(bench_verdict(evaluation, preflight) if evaluation else []),
         ],
     )
-    report.sheet(lambda: comparison.plot("sheet", baseline=baseline), comparison.verdict[0], "damper_sheet")
-    if tuned is not None:
-        report.sheet(lambda: tuned.plot("sheet"), tuned.verdict.sentence, "ride_sheet")
-    elif rides:
-        road, ride = next(iter(rides.items()))
-        report.sheet(lambda: plots.ride_sheet(ride, name=road), ride_verdict(ride)[-1], "ride_sheet")
+    if sheets:
+        _add_sheets(report, comparison, rides, tuned, baseline)
     records = (*comparison.best.result.runs, *comparison.held_out) if runs is None else tuple(runs)
     add_records(report, records, comparison.held_out, remarks, preflight)
     if evaluation is not None:
@@ -91,3 +92,19 @@ def chain_report(
         add_tuning(report, tuned)
     add_other_fits(report, comparison)
     return report
+
+
+def _add_sheets(
+    report: Report,
+    comparison: Comparison,
+    rides: Mapping[str, Mapping[str, Response]],
+    tuned: TuneResult | None,
+    baseline: AbstractDamper | None,
+) -> None:
+    """The damper, and its tuning or its first ride, each on one page."""
+    report.sheet(lambda: comparison.plot("sheet", baseline=baseline), comparison.verdict[0], "damper_sheet")
+    if tuned is not None:
+        report.sheet(lambda: tuned.plot("sheet"), tuned.verdict.sentence, "ride_sheet")
+    elif rides:
+        road, ride = next(iter(rides.items()))
+        report.sheet(lambda: plots.ride_sheet(ride, name=road), ride_verdict(ride)[-1], "ride_sheet")

@@ -15,7 +15,7 @@ import numpy as np
 from jaxdamp._display import display
 from jaxdamp._tables import Table
 from jaxdamp._types import Figure
-from jaxdamp._words import said
+from jaxdamp._words import first_upper, said
 from jaxdamp.report.attempts import Attempts
 
 
@@ -144,7 +144,7 @@ class Report:
             more: what else is known of it, folded.
         """
         lines, folded = (
-            "".join(f"<p>{self._escaped(sentence, said)}</p>" for sentence in part if sentence)
+            "".join(f"<p>{first_upper(self._escaped(sentence, said))}</p>" for sentence in part if sentence)
             for part in (sentences, more)
         )
         lines += f"<details><summary>more</summary>{folded}</details>" if folded else ""

@@ -30,7 +30,11 @@ from jaxdamp.simulation.stability import substeps_needed
 from jaxdamp.simulation.stationary import DEVIATIONS as DEVIATIONS, stationary_notes as stationary_notes
 from jaxdamp.simulation.step_size import CoarseStepWarning, RunCheck as RunCheck, TracedStepWarning
 from jaxdamp.simulation.stepper import AbstractStepper, ControlledStepper as ControlledStepper, Controller as Controller
-from jaxdamp.simulation.wheels import AxleTiming as AxleTiming, moves_axles as moves_axles
+from jaxdamp.simulation.wheels import (
+    AxleTiming as AxleTiming,
+    axle_timing as axle_timing,
+    moves_axles as moves_axles,
+)
 
 
 __all__ = [

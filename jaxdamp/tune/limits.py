@@ -52,8 +52,8 @@ class Limit(NamedTuple):
         return self._replace(lower=self.lower + by * self.scale, upper=self.upper - by * self.scale)
 
     def nearer(self, value: float) -> str:
-        """The nearer end in words, such as "<= 0.1 m"."""
-        sign, end = ("<=", self.upper) if self.upper - value <= value - self.lower else (">=", self.lower)
+        """The nearer end in words, such as "≤ 0.1 m"."""
+        sign, end = ("≤", self.upper) if self.upper - value <= value - self.lower else ("≥", self.lower)
         return f"{sign} {end:.4g} {typeset_unit(self.unit)}".rstrip()
 
 

@@ -17,6 +17,11 @@ from jaxdamp.vehicles.channels import Channel as Channel, ChannelKind as Channel
 from jaxdamp.vehicles.chosen_metrics import GOALS as GOALS, is_stationary as is_stationary
 from jaxdamp.vehicles.corner import Axle, Corner
 from jaxdamp.vehicles.critical import CriticalDamping as CriticalDamping, critical_damping
+from jaxdamp.vehicles.drawing import (
+    UNKNOWN_SPEED as UNKNOWN_SPEED,
+    Drawing as Drawing,
+    drawing_script as drawing_script,
+)
 from jaxdamp.vehicles.equilibrium import (
     refuse_restless as refuse_restless,
     rest_position as rest_position,

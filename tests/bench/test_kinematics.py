@@ -70,7 +70,7 @@ def test_a_table_beside_zero_is_noted(tmp_path):
         ("bump [mm],ratio [deg/mm]", [(0, 0.7), (10, 0.7)], {}, "without the unit 'deg/mm'"),
         ("bump [mm],ratio", [(0, 0.7), (0, 0.8)], {}, "wheel travel -?0 mm twice"),
         ("bump [mm],ratio,front ratio", [(0, 0.7, 1), (1, 0.8, 1)], {}, r'could both be the ratio.*"ratio": 2'),
-        ("bump [mm],damper [mm]", [(0, 0), (10, 7)], {"columns": {"wheel": "bumps"}}, "`columns`"),
+        ("bump [mm],damper [mm]", [(0, 0), (10, 7)], {"columns": {"wheel": "bumps"}}, r"columns=.*Did you mean 'bump'"),
         ("bump [mm],damper [mm]", [(0, 0), (10, 7)], {"columns": {"stroke": 1}}, "`columns`"),
         ("bump [mm],damper [mm]", [(0, 0), (10, 7)], {"sign": "up"}, "`sign`"),
     ],

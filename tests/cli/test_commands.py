@@ -67,7 +67,7 @@ def test_laws_lists_every_law_with_a_line() -> None:
 
 def test_fit_writes_laws_that_load_again(records: Path, tmp_path: Path) -> None:
     out = tmp_path / "fit"
-    text = jaxdamp("fit", records, "--law", "linear", "--law", "bilinear", "--out", out).output
+    text = jaxdamp("fit", records, "--law", "linear", "--law", "bilinear", "--verbose", "--out", out).output
     law = from_json(out / "best_law.json")
     assert isinstance(law, Bilinear)
     assert (float(law.rebound_rate), float(law.compression_rate)) == pytest.approx((2600.0, 1200.0), rel=2e-3)
@@ -134,7 +134,7 @@ def test_what_the_machine_adds_is_fitted_and_shown(records: Path, tmp_path: Path
 
 def test_one_law_is_fitted_without_a_ladder(records: Path, tmp_path: Path) -> None:
     text = " ".join(jaxdamp("fit", records, "--law", "linear", "--out", tmp_path / "fit").output.split())
-    assert "Fitting 1 law to 3 records" in text
+    assert "Fitting 1 law to 3 records ... - linear: RMSE " in text and "Records (" not in text  # by --verbose
     assert "Error of linear, held-out fit" in text and "law of velocity alone" in text
     assert not (tmp_path / "fit" / "ladder.png").exists()
 

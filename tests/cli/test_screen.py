@@ -1,6 +1,8 @@
 """What the terminal shows: stages, tables, what the reader decided."""
 
 import io
+import re
+import sys
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,6 +14,7 @@ from jaxdamp.bench import SineTest
 from jaxdamp.cli import console, offers
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.records import decisions
+from jaxdamp.cli.streams import write_plainly
 from jaxdamp.dampers import Linear
 from jaxdamp.report import Column, Table
 
@@ -45,7 +48,8 @@ def test_a_stage_shows_progress_and_keeps_its_time(terminal: bool, monkeypatch: 
         advance("[m/s]", 0)
         advance("", 2)
     file = screen.console.file
-    assert isinstance(file, io.StringIO) and "Work [N]: done in 2.3 s" in file.getvalue()
+    assert isinstance(file, io.StringIO) and "done in 2.3 s" in file.getvalue()
+    assert terminal or file.getvalue().count("Work [N]") == 1  # a log says nothing twice
     assert screen.times["Work [N]"] == pytest.approx(2.34)
     assert screen.times_table().rows[0][0] == "Work [N]"
 
@@ -91,3 +95,26 @@ def test_the_terminal_has_the_first_remarks_and_says_how_many_are_left() -> None
     screen.remarks(list("abcde"))
     screen.details(table)
     assert "- e" in out.getvalue() and "All" in out.getvalue()
+
+
+def test_lines_are_as_wide_as_columns_say_and_hang_below_their_first_word(
+    monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    Screen().points(["a force of 3 m/s^2 " + "and more words " * 4])
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("  - a force of 3 m/s² and") and len(lines) > 1
+    assert all(re.match("    [a-z]", line) for line in lines[1:])
+    assert max(map(len, lines)) <= 40
+
+
+@pytest.mark.parametrize(("encoding", "shown"), [("ascii", "<= -0.3 m/s^2"), ("utf-8", "≤ −0.3 m/s²")])
+def test_characters_that_an_output_lacks_are_written_plainly(
+    encoding: str, shown: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    raw = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(raw, encoding))
+    write_plainly()
+    Screen().say("≤ −0.3 m/s²")
+    sys.stdout.flush()
+    assert raw.getvalue().decode(encoding) == f"{shown}\n"

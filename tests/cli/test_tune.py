@@ -86,7 +86,7 @@ def test_limits_in_the_units_of_a_shop_are_those_in_si(tmp_path: Path) -> None:
     words = ["tune", "quarter_car_000", "white:C", "--max-steps", "1", "--fresh-roads", "0"]
     shop = ["--limit", "travel=0.5mm:2in,grip=400 lbf", "--limit", "comfort=0.1g"]
     shop += ["--bound", "damper.rate=5lbf s/in:25 lbf s/in"]
-    output = jaxdamp(*words, *shop, "--show-units", "imperial", "--out", tmp_path / "shop").output
+    output = jaxdamp(*words, *shop, "--show-units", "imperial", "--verbose", "--out", tmp_path / "shop").output
     si = [
         "--limit",
         "travel=0.0005:0.0508,grip=1779.2886460902,comfort=0.980665",

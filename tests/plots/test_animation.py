@@ -80,11 +80,11 @@ def test_it_plays_in_a_browser(half_car, tmp_path):
     with started() as browser:
         browser.open(page)
         assert browser.evaluate("document.querySelector('h1').textContent") == "<i>bump</i>"
-        browser.wait("time > 0.02")  # it plays by itself
+        browser.wait("film.time > 0.02")  # it plays by itself
         browser.click("#play")
-        stopped = browser.evaluate("time")
+        stopped = browser.evaluate("film.time")
         browser.settle()
-        assert browser.evaluate("time") == stopped
+        assert browser.evaluate("film.time") == stopped
         browser.choose("#time", "0.25")
         assert browser.evaluate("find('now').textContent") == "0.25 of 0.50 s"
         for width in (390, 1280):

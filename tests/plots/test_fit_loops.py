@@ -11,10 +11,13 @@ from jaxdamp.plots.loops import spread
 def test_axes_say_what_they_show_with_unit_and_sign(comparison: Comparison) -> None:
     figure = plots.fit_loops(comparison["bilinear"])
     labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes]
-    velocity, force = "velocity [m/s]   (+ rebound)", "force [N]   (+ resists extension)"
+    velocity, force = (
+        "velocity [m/s]   (+\N{NO-BREAK SPACE}rebound)",
+        "force [N]   (+\N{NO-BREAK SPACE}resists extension)",
+    )
     assert labels == [
         (velocity, force),
-        ("stroke [mm]   (+ rebound)", force),
+        ("stroke [mm]   (+\N{NO-BREAK SPACE}rebound)", force),
         (velocity, "fitted − measured [N]"),
         ("time in the cycle, over its period [–]", "fitted − measured [N]"),
     ]

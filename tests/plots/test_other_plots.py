@@ -42,8 +42,8 @@ def test_force_velocity_draws_each_law_where_asked() -> None:
     np.testing.assert_allclose(_line(axes, "a"), np.stack([velocity, 2000.0 * velocity], axis=1))
     np.testing.assert_allclose(_line(axes, "b")[:, 1], np.where(velocity > 0, 2000.0, 1000.0) * velocity)
     assert (axes.get_xlabel(), axes.get_ylabel()) == (
-        "velocity [m/s]   (+ rebound)",
-        "force [N]   (+ resists extension)",
+        "velocity [m/s]   (+\N{NO-BREAK SPACE}rebound)",
+        "force [N]   (+\N{NO-BREAK SPACE}resists extension)",
     )
     labels = {text.get_text(): text.get_color() for text in axes.texts}  # at the ends of the curves, in their colours
     assert labels == {line.get_label(): line.get_color() for line in axes.get_lines()[:2]}
@@ -150,9 +150,9 @@ def test_ride_draws_channels_over_time_and_the_spectrum(responses: dict[str, Res
         np.testing.assert_allclose(line, np.stack([time[seen], factor * np.asarray(response[channel])[seen]], axis=1))
     labels = [axes.get_ylabel() for axes in figure.axes]
     assert labels == [
-        "body acceleration [m/s²]\n(+ up)",
-        "stroke [mm]\n(+ rebound)",
-        "dynamic tyre load [N]\n(+ more load)",
+        "body acceleration [m/s²]\n(+\N{NO-BREAK SPACE}up)",
+        "stroke [mm]\n(+\N{NO-BREAK SPACE}rebound)",
+        "dynamic tyre load [N]\n(+\N{NO-BREAK SPACE}more load)",
         "power spectral density [(m/s²)²/Hz]",
     ]
     assert (load.get_xlabel(), spectrum.get_xlabel()) == ("time [s]", "frequency [Hz]")

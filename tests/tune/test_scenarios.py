@@ -77,7 +77,7 @@ def test_limits_hold_in_every_scenario() -> None:
     assert result.scenarios is not None
     assert np.max(result.scenarios.after[ACCELERATION]) == pytest.approx(1.204, rel=1e-5)
     (held,) = result.active
-    assert held == "rms_sprung_acceleration <= 1.204 m/s², in 'D, empty'"
+    assert held == "rms_sprung_acceleration ≤ 1.204 m/s², in 'D, empty'"
 
 
 def test_tolerances_and_samples_are_conditions() -> None:

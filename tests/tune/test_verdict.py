@@ -85,7 +85,7 @@ def test_a_violated_limit_is_said_first_with_its_number():
     result = tune.minimise(COMFORT, CAR, WHITE, limits={"working_space_rms": 1e-3})
     assert list(result.violated) == ["working_space_rms"] and result.active_limits == ()
     value = f"{result.after['working_space_rms']:.4g}"
-    assert result.summary.startswith(f"Limit not met: working_space_rms is {value}, and must be <= 0.001 m")
+    assert result.summary.startswith(f"Limit not met: working_space_rms is {value}, and must be ≤ 0.001 m")
     (row,) = [row for row in result.table().records() if row["metric"] == "working_space_rms"]
     assert row["note"] == "limit 0.001 m, violated" and result.verdict.outcome is Outcome.LIMIT_NOT_MET
     labels = [label.get_text() for axes in result.plot().axes for label in axes.get_yticklabels()]
@@ -177,7 +177,7 @@ def test_the_cheapest_relaxation_gives_one_percent():
     """By its price: run again with the limit that the result proposes."""
     soft = presets.quarter_car_000(dampers.Linear(6000.0))
     result = tune.minimise("working_space_rms", soft, WHITE, limits={TYRE: "+1%"})
-    assert result.relaxation.startswith(f"Cheapest for 1 % less working_space_rms: {TYRE} <= ")
+    assert result.relaxation.startswith(f"Cheapest for 1 % less working_space_rms: {TYRE} ≤ ")
     assert result.summary.endswith(result.relaxation)
     again = tune.minimise("working_space_rms", soft, WHITE, limits={TYRE: moved_limit(result)})
     assert again.after["working_space_rms"] / result.after["working_space_rms"] == pytest.approx(0.99, abs=1e-3)
@@ -188,9 +188,7 @@ def test_of_limits_that_are_not_met_those_within_reach_are_said():
     """They are met, and 1 % less is not."""
     result = tune.minimise(COMFORT, CAR, WHITE, limits={"working_space_rms": 1e-3})
     reach = moved_limit(result)
-    assert (
-        result.relaxation.startswith("Within reach: working_space_rms <= ") and " instead of 0.001." in result.summary
-    )
+    assert result.relaxation.startswith("Within reach: working_space_rms ≤ ") and " instead of 0.001." in result.summary
     for factor, met in ((1.0, True), (0.99, False)):
         again = tune.minimise(COMFORT, CAR, WHITE, limits={"working_space_rms": factor * reach})
         assert (not again.violated) is met

@@ -55,14 +55,14 @@ function firstCounted(record, states) {
   return Math.min(Math.ceil(period / record.dt), Math.floor(record.x.length / 2));
 }
 
-// Heights [m] of a sum of cosines z = a cos(2 pi n s + phase), n = k/length, at the distances s = speed t, faded in.
-function isoHeights(road, { amplitude, phase }, scale, speed, dt, count) {
+// Heights [m] of a sum of cosines z = a cos(2 pi n s + phase), n = k/length, at s = speed (t - delay), faded in.
+function isoHeights(road, { amplitude, phase }, scale, speed, dt, count, delay) {
   const heights = new Float64Array(count), again = 256;
   for (let line = 0; line < phase.length; ++line) {
     const cycles = (road.first + line) / road.length * speed * dt, size = scale * amplitude[line];
     const turnCos = Math.cos(2 * Math.PI * cycles), turnSin = Math.sin(2 * Math.PI * cycles);
     for (let begin = 0; begin < count; begin += again) {  // afresh, so that rounding does not add up
-      const angle = 2 * Math.PI * ((cycles * begin) % 1) + phase[line], end = Math.min(begin + again, count);
+      const angle = 2 * Math.PI * ((cycles * (begin - delay / dt)) % 1) + phase[line], end = Math.min(begin + again, count);
       let real = size * Math.cos(angle), imaginary = size * Math.sin(angle);
       for (let i = begin; i < end; ++i) {
         heights[i] += real;
@@ -72,7 +72,8 @@ function isoHeights(road, { amplitude, phase }, scale, speed, dt, count) {
       }
     }
   }
-  for (let i = 0; i < count && i * dt < road.ramp; ++i) heights[i] *= 0.5 * (1 - Math.cos(Math.PI * i * dt / road.ramp));
+  const faded = (share) => 0.5 * (1 - Math.cos(Math.PI * Math.max(share, 0)));
+  for (let i = 0; i < count && i * dt - delay < road.ramp; ++i) heights[i] *= faded((i * dt - delay) / road.ramp);
   return heights;
 }
 
@@ -85,32 +86,43 @@ function rates(heights, dt) {
   });
 }
 
-// A run of the car: the metrics in their order, and the channels over time.
-function ride(program, sizes, p, q, road, dt, substeps, channels) {
-  const { heights, rate } = road, count = heights.length;
-  const [m, c, g, from, to, fromRate, toRate] = [sizes.m, sizes.c, sizes.g, 1, 1, 1, 1].map((n) => new Float64Array(n));
-  const metrics = [], records = channels.map(() => new Float64Array(count));
-  const save = (i) => records.forEach((record, k) => { record[i] = g[k]; });
+// A run of the car: the metrics in their order, the channels over time, and at each `every`th instant what moves.
+function ride(program, sizes, p, q, road, dt, substeps, channels, every) {
+  const { heights, rates } = road, wheels = heights.length, count = heights[0].length;
+  const [m, c, g] = [sizes.m, sizes.c, sizes.g].map((n) => new Float64Array(n));
+  const [from, to, fromRate, toRate] = [1, 1, 1, 1].map(() => new Float64Array(wheels));
+  const metrics = [], records = channels.map(() => new Float64Array(count)), now = [], moving = [];
+  const put = (target, values, i, share) => {  // between the instants i - 1 and i
+    for (let w = 0; w < wheels; ++w) {
+      const value = values[w], before = share < 1 ? value[i - 1] : 0;
+      target[w] = share < 1 ? before + share * (value[i] - before) : value[i];
+    }
+  };
+  const save = (i) => {
+    for (let k = 0; k < records.length; ++k) records[k][i] = g[k];
+    if (i % every) return;
+    program.moving(m, c, to, toRate, now);
+    now.forEach((value, k) => (moving[k] ??= []).push(value));
+  };
   program.prepare(p, q, dt / substeps, m);
-  [from[0], fromRate[0]] = [heights[0], rate[0]];
-  program.start(m, from, fromRate, c);
-  program.begin(m, c, from, fromRate, g);
+  put(to, heights, 0, 1);
+  put(toRate, rates, 0, 1);
+  program.start(m, to, toRate, c);
+  program.begin(m, c, to, toRate, g);
   save(0);
   for (let i = 1; i < count; ++i) {
-    const h = heights[i - 1], r = rate[i - 1], rise = heights[i] - h, change = rate[i] - r;
     for (let k = 0; k < substeps; ++k) {
-      const a = k / substeps, b = (k + 1) / substeps;
-      from[0] = h + a * rise;
-      fromRate[0] = r + a * change;
-      to[0] = k + 1 < substeps ? h + b * rise : heights[i];
-      toRate[0] = k + 1 < substeps ? r + b * change : rate[i];
+      put(from, heights, i, k / substeps);
+      put(fromRate, rates, i, k / substeps);
+      put(to, heights, i, (k + 1) / substeps);
+      put(toRate, rates, i, (k + 1) / substeps);
       program.step(m, c, from, fromRate, to, toRate);
     }
     program.observe(m, c, g, to, toRate);
     save(i);
   }
   program.end(m, g, metrics);
-  return { metrics, records };
+  return { metrics, records, moving };
 }
 
 // The discrete Fourier transform of 2^k numbers, in place; `turns` holds cosines and sines of one turn.

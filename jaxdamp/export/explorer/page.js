@@ -3,6 +3,7 @@
 const DATA = JSON.parse(document.getElementById("data").textContent);
 const get = (id) => document.getElementById(id);
 const SEGMENT = 2048, CURVES = ["curve0", "curve1", "curve2", "curve3"], CHECK_AFTER = 400, TOLERANCE = 0.01, MOST_SUBSTEPS = 64;
+const EVERY = Math.max(1, Math.round(0.01 / DATA.dt));  // of the instants of a run are shown in motion
 
 const cached = new Map();  // loops of the baseline, which no slider moves
 
@@ -11,8 +12,9 @@ const values = { law: start(DATA.law.numbers), vehicle: start(DATA.vehicle.numbe
 const records = DATA.records.map((record) => ({ ...record, x: unpacked(record.x), v: unpacked(record.v), force: unpacked(record.force) }));
 const iso = DATA.road.iso;
 const drawnRoads = iso.drawn.map(({ amplitude, phase }) => ({ amplitude: unpacked(amplitude), phase: unpacked(phase) }));
-const profile = DATA.road.profile && { ...DATA.road.profile, heights: unpacked(DATA.road.profile.heights) };
+const profile = DATA.road.profile && { ...DATA.road.profile, heights: DATA.road.profile.heights.map(unpacked) };
 const charts = Object.fromEntries(["loopVelocity", "loopStroke", "spectrum", "trace"].map((id) => [id, new Chart(get(id))]));
+const film = new Film({ play: get("filmPlay"), speed: get("filmSpeed"), time: get("filmTime"), now: get("filmNow") });
 const sides = {
   law: { program: LAW, states: DATA.law.states, sizes: DATA.law.sizes },
   baseline: { program: BASELINE, states: DATA.baseline.states, sizes: DATA.baseline.sizes },
@@ -31,16 +33,20 @@ function lawNumbers(side) {
 
 // Roads -----------------------------------------------------------------------------------------------------------
 
+// The heights under each wheel.
 function roadHeights() {
-  const { dt, count } = DATA, kind = get("roadKind").value, speed = positive("speed");
+  const { dt, count } = DATA, kind = get("roadKind").value;
   if (kind === "profile") return profile.heights;
-  if (kind === "bump") {
-    const [height, length] = [Number(get("bumpHeight").value) / 1000, positive("bumpLength")];
-    return Float64Array.from({ length: count }, (_, i) => ROAD.bump(i * dt, height, length, speed));
-  }
-  const most = iso.length / ((count - 1) * dt);
-  if (speed > most) throw new Error(`At ${speed} m/s the road of ${iso.length} m repeats within the run: take at most ${readable(most)} m/s.`);
-  return isoHeights(iso, drawnRoads[Number(get("seed").value)], 2 ** (kind.charCodeAt(0) - 65), speed, dt, count);
+  const speed = positive("speed"), most = iso.length / ((count - 1) * dt);
+  if (kind !== "bump" && speed > most) throw new Error(`At ${speed} m/s the road of ${iso.length} m repeats within the run: take at most ${readable(most)} m/s.`);
+  const [height, length] = kind === "bump" ? [Number(get("bumpHeight").value) / 1000, positive("bumpLength")] : [];
+  const under = (behind) => {
+    const delay = behind / speed;
+    if (kind === "bump") return Float64Array.from({ length: count }, (_, i) => ROAD.bump(i * dt - delay, height, length, speed));
+    return isoHeights(iso, drawnRoads[Number(get("seed").value)], 2 ** (kind.charCodeAt(0) - 65), speed, dt, count, delay);
+  };
+  const behind = DATA.vehicle.behind, axles = new Map([...new Set(behind)].map((each) => [each, under(each)]));
+  return behind.map((each) => axles.get(each));
 }
 
 function positive(id) {
@@ -55,7 +61,7 @@ function chooseRoad() {
     get(id).hidden = !shown;
   attempt("roadError", () => {
     const heights = roadHeights();
-    state.road = { heights, rate: rates(heights, DATA.dt) };
+    state.road = { heights, rates: heights.map((each) => rates(each, DATA.dt)) };
     state.substeps = DATA.substeps;
     state.results.baseline = null;
     refresh();
@@ -66,7 +72,7 @@ function chooseRoad() {
 
 function drive(side, substeps) {
   const { program, sizes } = sides[side], q = numbersOf(DATA.vehicle.numbers, values.vehicle);
-  return ride(program, sizes, lawNumbers(side), q, state.road, DATA.dt, substeps, DATA.channels);
+  return ride(program, sizes, lawNumbers(side), q, state.road, DATA.dt, substeps, DATA.channels, EVERY);
 }
 
 function refreshRide() {
@@ -77,6 +83,7 @@ function refreshRide() {
   state.vehicleBefore = before;
   showMetrics();
   showChannel();
+  showMotion();
   clearTimeout(state.timer);
   get("stepNote").textContent = "";
   state.timer = setTimeout(checkStep, CHECK_AFTER);
@@ -230,6 +237,23 @@ function showChannel() {
   get("channelMeaning").textContent = channel.meaning;
 }
 
+// In motion -------------------------------------------------------------------------------------------------------
+
+function showMotion() {
+  const { drawing, vehicle, dt } = DATA, kind = get("roadKind").value, coordinates = drawing.heights[0].length;
+  const way = kind === "profile" ? profile : { speed: positive("speed"), driven: true };
+  const roads = state.road.heights.map((heights) => heights.filter((_, i) => i % EVERY === 0).map((z) => 1e4 * z));
+  const design = ({ moving }) => ({
+    ...drawing, ...way,
+    points: drawing.points.map((point, k) => ({ ...point, height: moving[0].map((_, i) => 1e4 * drawing.heights[k].reduce((sum, share, j) => sum + share * moving[j][i], 0)) })),
+    dampers: drawing.dampers.map((damper, k) => ({ ...damper, force: moving[coordinates + k] })),
+    wheels: drawing.wheels.map((wheel, k) => ({ ...wheel, road: roads[k] })),
+  });
+  film.take(["baseline", "law"].map((side) => design(state.results[side])), [get("filmBaseline"), get("filmLaw")], EVERY * dt);
+  get("filmNote").textContent = `Heights drawn ${film.factor} times as large. Arrows at the dampers: orange pulls the ends together, blue pushes them apart.`
+    + (way.known === false ? ` The road is drawn as at ${way.speed} m/s.` : "") + (vehicle.fixed.length ? ` What places the wheels stays as loaded: ${vehicle.fixed.join(", ")}.` : "");
+}
+
 // The law as JSON -------------------------------------------------------------------------------------------------
 
 function lawDocument() {
@@ -271,6 +295,10 @@ function takeDropped() {
   });
 }
 
+function redraw() {
+  [...Object.values(charts), film].forEach((picture) => picture.draw());
+}
+
 // Begin -----------------------------------------------------------------------------------------------------------
 
 function begin() {
@@ -297,7 +325,7 @@ function begin() {
   get("speed").value = DATA.road.speed;
   drawnRoads.forEach((_, k) => get("seed").append(element("option", { value: k }, String(iso.seed + k))));
   DATA.channels.forEach((channel, k) => get("channel").append(element("option", { value: k }, channel.title)));
-  get("baselineHead").textContent = DATA.baseline.title;
+  for (const id of ["baselineHead", "filmHead"]) get(id).textContent = DATA.baseline.title;
   for (const id of ["motion", "amplitude", "frequencies"]) get(id).addEventListener("input", schedule);
   for (const id of ["roadKind", "speed", "seed", "bumpHeight", "bumpLength"]) get(id).addEventListener("input", chooseRoad);
   get("channel").addEventListener("input", () => attempt("roadError", showChannel));
@@ -308,9 +336,9 @@ function begin() {
   get("theme").addEventListener("click", () => {
     const root = document.documentElement, dark = getComputedStyle(root).colorScheme === "dark";
     root.dataset.theme = dark ? "light" : "dark";
-    Object.values(charts).forEach((chart) => chart.draw());
+    redraw();
   });
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => Object.values(charts).forEach((chart) => chart.draw()));
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   document.addEventListener("dragover", (event) => { event.preventDefault(); document.body.classList.add("dragging"); });
   document.addEventListener("dragleave", (event) => event.relatedTarget || document.body.classList.remove("dragging"));
   document.addEventListener("drop", (event) => {
@@ -319,6 +347,7 @@ function begin() {
     if (event.dataTransfer.files[0]) dropped(event.dataTransfer.files[0]);
   });
   chooseRoad();
+  film.set(!matchMedia("(prefers-reduced-motion: reduce)").matches);
   document.documentElement.dataset.ready = "";
 }
 
