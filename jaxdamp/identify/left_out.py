@@ -114,8 +114,8 @@ def _of_the_law(named: Sequence[_Named], left: float) -> str:
         effect = named[-1].effect
         return f"By the residual, the law misses {effect.words(named[-1].sizes)}{alike}: {effect.remedy}. {LAST_WORD}"
     return (
-        f"The residual repeats from cycle to cycle, and {100 * min(left, 1.0):.0f} % of that is like no fault of a"
-        f" machine{alike}: the law misses something of the damper. {LAST_WORD}"
+        f"The residual repeats from cycle to cycle, and no effect of the test machine explains"
+        f" {100 * min(left, 1.0):.0f} % of that{alike}: the law misses something of the damper. {LAST_WORD}"
     )
 
 
