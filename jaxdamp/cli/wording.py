@@ -37,6 +37,7 @@ CALLS = {
     r"`data\.failed` marks them, and `data\.reason` says why": "sweep.csv has the reasons",
     r"Drive over (a random road instead: )?`roads\.iso8608\([^`]*`": "Take iso:CLASS",
     r", or take an implicit solver, `engine=[^`]*`": "",
+    r"`read_rides\(\.\.\., units=\{[^`]*`": "--units",
     r"`read_rides\(\.\.\., reversed_channels=\[[^`]*`": "--reversed",
     r"State it as held, `run\.held_at\(([^`]*)\)`": r"State it as held, --command NAME=\1",
     r"Record the command as a channel, `BenchRun\.command_channel`": "Record the command, --columns command=...",
