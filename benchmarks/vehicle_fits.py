@@ -7,6 +7,7 @@ platform and on a road, from a start that is 10 to 40 % off. No force is measure
 
 import sys
 import time
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -40,26 +41,37 @@ def records(seed: int) -> list[RideRecord]:
     ]
 
 
-def distances(seed: int) -> dict[str, float]:
-    """(value − true)/standard error of every parameter."""
+def fitted(seed: int) -> identify.VehicleFit:
+    """The rig from its records."""
     sensors = {name: Sensor(**dict.fromkeys(sensor.given, 0.0)) for name, sensor in SENSORS.items()}
-    result = identify.fit(replace(RIG, START), records(seed), sensors=sensors, freeze=KNOWN)
-    assert result.converged and result.held == ("vehicle.car.sprung_mass",), result
-    return {str(row[0]): float(str(row[5])) for row in result.table(RIG, sensors=SENSORS).rows}
+    return identify.fit(replace(RIG, START), records(seed), sensors=sensors, freeze=KNOWN)
 
 
-def main(seeds: int) -> None:
-    rows: list[dict[str, float]] = []
-    for seed in range(seeds):
-        begin = time.perf_counter()
-        rows.append(distances(seed))
-        worst = max(rows[-1], key=lambda name: abs(rows[-1][name]))
-        print(f"seed {seed}: largest {rows[-1][worst]:+.2f} ({worst}), {time.perf_counter() - begin:.1f} s", flush=True)
+def distances(
+    result: identify.VehicleFit, vehicle: vehicles.AbstractVehicle, sensors: dict[str, Sensor]
+) -> dict[str, float]:
+    """(value − true)/standard error of every parameter."""
+    return {str(row[0]): float(str(row[5])) for row in result.table(vehicle, sensors=sensors).rows}
+
+
+def summarise(rows: Sequence[Mapping[str, float]]) -> None:
+    """Print the distances over all repeats, and how many are within 1.96 and 3 standard errors."""
     table = np.array([list(row.values()) for row in rows])
     for name, column in zip(rows[0], table.T, strict=True):
         print(f"{name:40s} mean {column.mean():+.2f}  spread {column.std(ddof=1):.2f}  largest {abs(column).max():.2f}")
     inside = [100 * np.mean(abs(table) < limit) for limit in (1.96, 3.0)]
     print(f"{table.size} parameters: {inside[0]:.1f} % within 1.96, {inside[1]:.1f} % within 3 standard errors")
+
+
+def main(seeds: int) -> None:
+    rows: list[dict[str, float]] = []
+    for seed in range(seeds):
+        begin, result = time.perf_counter(), fitted(seed)
+        assert result.converged and result.held == ("vehicle.car.sprung_mass",), result
+        rows.append(distances(result, RIG, SENSORS))
+        worst = max(rows[-1], key=lambda name: abs(rows[-1][name]))
+        print(f"seed {seed}: largest {rows[-1][worst]:+.2f} ({worst}), {time.perf_counter() - begin:.1f} s", flush=True)
+    summarise(rows)
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ CURRENTS = {"*_0A": 0.0, "*_0.5A": 0.5, "*_1.0A": 1.0}
 SEARCH = {"samples_per_cycle": 100, "max_steps": 30, "starts": 1}
 PARTS = ("moving", "whole", "estimated")
 CREEPING = "creeping_visco_plastic_spring"
-LAWS = ["lugre_spring", "visco_plastic_spring", CREEPING]
+LAWS = ["lugre_spring", "visco_plastic_spring", "thinned_visco_plastic", CREEPING]
 
 
 def creeping(velocity: np.ndarray, force: np.ndarray, stroke: np.ndarray) -> dampers.AbstractDamper:
@@ -58,7 +58,9 @@ def main() -> None:
         groups = [scores.fit_percent(scores.best, group) for group in scores.groups]
         rows.append((part, scores.best, *groups, scores.fit_percent(scores.best)))
         if options.nested:
-            rows.append((part, "chosen", None, None, None, scores.chosen_fit_percent))
+            by_group = [[fold.fit_percent for fold in scores.choices if fold.group == group] for group in scores.groups]
+            rows.append((part, "chosen", *(float(np.mean(fits)) for fits in by_group), scores.chosen_fit_percent))
+            print(*(f"{fold.held_out}: {fold.law}" for fold in scores.choices), sep="\n")
     columns = [Column(name, "%", ".1f") for name in ("0 A", "0.5 A", "1 A", "all")]
     print(Table("Fit of held-out records", (Column("records"), Column("law"), *columns), tuple(rows)).to_text())
 

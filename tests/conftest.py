@@ -17,6 +17,7 @@ jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 os.environ.setdefault("MPLBACKEND", "Agg")
+os.environ.pop("COLUMNS", None)  # of pytest-xdist: commands are as wide as where they write into a file
 
 
 MAPS = Path("/proc/self/maps")

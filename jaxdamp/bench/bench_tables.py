@@ -230,6 +230,7 @@ def _record(
             source or "velocity as the file states",
         ),
         stroke_is_integrated=integrated or stated.get("stroke_is_integrated", False),
+        units={role: column.unit for role, column in columns.items()},
     )
 
 

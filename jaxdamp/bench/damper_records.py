@@ -85,11 +85,29 @@ class DamperRecords(Mapping[str, tuple[BenchRun, ...]]):
         """The text that changes whenever the records of a damper change; empty if nothing was stated."""
         return self._dampers[name][1]
 
+    def process(self, **steps: object) -> "DamperRecords":
+        """The records with steps done, as by `BenchSet.process`, each time they are read.
+
+        Arguments:
+            steps: of `BenchRun.process`, such as `moving=True`.
+        """
+        if not steps:
+            return self
+        keys, stamps = zip(*self._dampers.values(), strict=True)
+        read = functools.partial(_processed, self._read, steps)
+        return DamperRecords(read, keys, self._dampers, [f"{stamp} {steps}".strip() for stamp in stamps])
+
     def part(self, names: Iterable[str]) -> "DamperRecords":
         """Some of the dampers."""
         names = list(names)
         keys, stamps = zip(*(self._dampers[name] for name in names), strict=True) if names else ((), ())
         return DamperRecords(self._read, keys, names, stamps)
+
+
+def _processed(read: Callable[..., object], steps: Mapping[str, object], key: object) -> BenchSet:
+    """The records of a damper with steps done."""
+    process: Callable[..., BenchSet] = BenchSet(as_runs(read(key))).process
+    return process(**steps)
 
 
 def read_dampers(paths: str | os.PathLike[str], *, each: str, **options: object) -> DamperRecords:

@@ -5,7 +5,7 @@ raw record in the order of the fields of `Steps`: so it does not matter in which
 """
 
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 import numpy as np
 from jaxtyping import Float
@@ -87,6 +87,14 @@ class Steps:
                 remedy = "Begin with `run.raw`."
                 _checks.refuse(field.name, "be given once", f"{new} after {old}", remedy)
         return Steps(**merged)
+
+
+class Origin(NamedTuple):
+    """Where a processed record comes from: the raw record, the part of it that the steps begin with, the steps."""
+
+    raw: "BenchRun"
+    base: "BenchRun"
+    steps: Steps
 
 
 def processed(raw: "BenchRun", steps: Steps) -> "BenchRun":

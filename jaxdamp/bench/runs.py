@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple, final
+from typing import Any, final
 
 import numpy as np
 from jaxtyping import ArrayLike, Float
@@ -16,7 +16,7 @@ from jaxdamp._types import Figure
 from jaxdamp.bench import clock
 from jaxdamp.bench.headers import COMMAND_HEADER
 from jaxdamp.bench.motion import cycle_instants, cycle_works, dominant_frequency, motion_amplitude
-from jaxdamp.bench.processing import BESIDE, Steps, choose_cycles, cut_between, processed
+from jaxdamp.bench.processing import BESIDE, Origin, Steps, choose_cycles, cut_between, processed
 from jaxdamp.bench.units import COMMAND_UNITS
 from jaxdamp.bench.velocity import estimate_velocity
 
@@ -64,6 +64,7 @@ class BenchRun:
         notes: sentences on what was done to the data.
         stroke_is_integrated: the stroke was integrated from the velocity, so that its zero is the middle of the motion
             and no place in the damper.
+        units: of the numbers in the file, by channel, as they were stated and brought to SI; empty for other records.
 
     Raises:
         ValueError: channels of different lengths, fewer than 20 samples, NaN, time not uniform, constant stroke; a
@@ -90,7 +91,8 @@ class BenchRun:
     stroke_is_integrated: bool = False
     command_channel: Float[np.ndarray, " time"] | None = None
     command_unit: str = ""
-    _origin: "Origin | None" = field(default=None, init=False)
+    units: Mapping[str, str] = field(default_factory=dict)
+    _origin: Origin | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         where = f"record {self.name!r}"
@@ -257,7 +259,7 @@ class BenchRun:
         together = origin.steps.and_then(more)
         return processed(origin.base, together)._from(Origin(origin.raw, origin.base, together))
 
-    def _from(self, origin: "Origin | None") -> "BenchRun":
+    def _from(self, origin: Origin | None) -> "BenchRun":
         object.__setattr__(self, "_origin", origin)
         return self
 
@@ -340,11 +342,3 @@ class BenchRun:
         path = Path(path)
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
         return path
-
-
-class Origin(NamedTuple):
-    """Where a processed record comes from: the raw record, the part of it that the steps begin with, the steps."""
-
-    raw: BenchRun
-    base: BenchRun
-    steps: Steps

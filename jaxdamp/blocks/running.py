@@ -1,5 +1,6 @@
 """Blocks of work, computed here, by a part of an array job, or by the processes of an executor or a Dask cluster."""
 
+import functools
 import importlib.metadata
 import itertools
 import os
@@ -268,6 +269,7 @@ def _part(text: str, left: list[int]) -> list[int]:
     return [number for number in left if number % parts == part - 1]
 
 
+@functools.cache
 def _versions() -> dict[str, str]:
     return {name: importlib.metadata.version(name) for name in ("jaxdamp", "jax", "jaxlib", "numpy")}
 

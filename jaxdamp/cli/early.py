@@ -32,7 +32,7 @@ def check(command: str, given: Mapping[str, Any]) -> None:
     if "out" in given:
         again = {"replace": bool(given["replace"]), "resume": bool(given.get("resume"))}
         refuse_target(resuming.target_of(command, given), command, **again)
-    if given.get("files"):
+    if given.get("files") and given.get("each") is None:  # a line may have its records in folders inside
         find_files(given["files"], FOLDER_SUFFIXES)
     for name in ("law", "start", "baseline"):
         if isinstance(given.get(name), Path):

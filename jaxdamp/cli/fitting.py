@@ -11,6 +11,7 @@ from jaxdamp.cli.console import Screen
 from jaxdamp.cli.interrupt import Interrupted
 from jaxdamp.cli.jobs import Job, Output, job, write_tables
 from jaxdamp.cli.limits import bounds_in_si
+from jaxdamp.cli.line_fitting import fit_line
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.records import Reading, decisions, grouped, law_names, split
 from jaxdamp.cli.table_fitting import Refused, fit_table, records_of, through_points
@@ -60,6 +61,8 @@ def fit(
     group_by: str | None = None,
     cross_validate: bool = False,
     baseline: Path | None = None,
+    each: str | None = None,
+    in_control: int | None = None,
     report: Path | None = None,
     resume: bool = False,
     output: Output,
@@ -73,17 +76,31 @@ def fit(
     contradict one another and their names tell them apart, all of this in a folder for each value of the setting. Laws
     and tables are in the folder before the first picture is drawn.
 
+    With --each, the records are those of a production line: one law is fitted to every damper. The fits are kept beside
+    the results, and the same command later, with --replace, fits only dampers that are new or changed.
+
     Arguments:
         law: names of laws, see "jaxdamp laws": "linear,besinger"; or "all"; six that suit the records if left out.
         held_out: records to score on, not to fit: a name or a pattern, such as "30mm_*".
         rig: what the test machine adds.
         cross_validate: predict each record by the best law fitted to the others.
+        each: what a damper of a production line is: every folder with records, every file, or every name in a table
+            with the columns damper and file.
+        in_control: so many dampers at the beginning were in control: limits of control charts of all, with --each.
     """
+    given = {"held_out": held_out, "group_by": group_by, "cross_validate": cross_validate, "baseline": baseline}
+    if each is not None:
+        refused = _given(**given, report=report, resume=resume)
+        options = _options(how, rig)
+        machine = options.pop("rig")
+        fit_line(screen, files, each, law, machine, reading, options, output, in_control=in_control, refused=refused)
+        return
+    if in_control is not None:
+        _checks.refuse("in_control", "be given with --each", in_control, "Or leave it out.")
     table = reading.table(files)
     kind = None if table is None else through_points(law)
     if table is not None and kind is not None:
-        given = {"held_out": held_out, "group_by": group_by, "cross_validate": cross_validate, "baseline": baseline}
-        fit_table(screen, table, kind, output, [Refused(name, bool(value)) for name, value in given.items()])
+        fit_table(screen, table, kind, output, _given(**given))
         return
     names = law_names(law)
     options = _options(how, rig)
@@ -107,6 +124,11 @@ def fit(
             remedy = "Records at each inner command are predicted without them anyway; --group-by command fits apart."
             _checks.refuse("cross_validate", "be left out where the records state several commands", "given", remedy)
         Fits(work, names, options, found, remarks, cross_validate, beside).of_all(groups, held)
+
+
+def _given(**options: object) -> list[Refused]:
+    """Options that a kind of fit refuses if they are given."""
+    return [Refused(name, bool(value)) for name, value in options.items()]
 
 
 def _options(how: Call, rig: Sequence[str]) -> dict[str, Any]:

@@ -121,7 +121,7 @@ class Reading:
 
 
 def law_names(asked: Sequence[str]) -> list[str]:
-    """The laws to fit: all that are not optional, or those named, each once; none for those that suit the records.
+    """The laws to fit, each once: those named, with "all" all that are not optional; none for what suits the records.
 
     >>> law_names(["linear, besinger", "linear"])
     ['linear', 'besinger']
@@ -133,7 +133,7 @@ def law_names(asked: Sequence[str]) -> list[str]:
         _checks.refuse("law", "name a law", "empty", 'See "jaxdamp laws".')
     for name in asked:
         _checks.one_of("law", name, ("all", *identify.NAMED_LAWS))
-    return list(identify.LAWS) if "all" in asked else list(dict.fromkeys(asked))
+    return list(dict.fromkeys(law for name in asked for law in (identify.LAWS if name == "all" else (name,))))
 
 
 def split(runs: BenchSet, patterns: Sequence[str]) -> tuple[BenchSet, BenchSet]:

@@ -40,7 +40,8 @@ def noted(command: str, given: Mapping[str, object]) -> AbstractContextManager[N
     Raises:
         ValueError: arguments, files or versions differ from those of the run to be resumed.
     """
-    now = _described(command, given) if command in COMMANDS else {}
+    resumes = command in COMMANDS and given.get("each") is None  # the fits of a line have a store of their own
+    now = _described(command, given) if resumes else {}
     before = _before(target_of(command, given)) if given.get("resume") else {}
     differences = [
         _difference(name, before[kind].get(name), now[kind].get(name), is_file=kind == "files")

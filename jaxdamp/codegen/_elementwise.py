@@ -15,7 +15,7 @@ SAME_NAME = frozenset(
     "erf erfc floor ceil is_finite".split()
 )
 OTHER_NAME = {"add_any": "add"}
-UNCHANGED = frozenset({"stop_gradient", "copy", "copy_p", "name", "optimization_barrier", "pvary"})
+UNCHANGED = frozenset({"stop_gradient", "copy", "copy_p", "name", "optimization_barrier", "pvary", "reshard"})
 
 Rule = Callable[[Writer, Equation, list[Atoms]], list[Atoms]]
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from importlib import resources
-from typing import NamedTuple, final
+from typing import NamedTuple, TypeGuard, final
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from jaxdamp.codegen._printing import printing
 from jaxdamp.codegen._program import (
     Atom,
     Atoms,
+    Declare,
     Define,
     Statement,
     Table,
@@ -22,6 +23,7 @@ from jaxdamp.codegen._program import (
     Writer,
     constant,
     names,
+    names_in,
     operands_of,
     pruned,
 )
@@ -50,15 +52,19 @@ class Loop(NamedTuple):
 
     parts: dict[str, str | list[str]]  # lines of C by what they depend on, and counts
     laned: tuple[bool, ...]  # which of the carried values differ from point to point
+    straight: bool  # whether a step is without loops and branches
 
     @property
     def text(self) -> str:
-        """C for points side by side in vectors."""
+        """C for points side by side in vectors, which cannot follow loops and branches inside a step."""
+        if not self.straight:
+            message = "A loop or a branch inside a step cannot be printed for many points side by side."
+            raise NotImplementedError(message)
         return _filled("lanes.c", self.parts)
 
     @property
     def kernel(self) -> str:
-        """CUDA for a point in each thread; compiled as C, threads are a loop."""
+        """CUDA for a point in each thread, which has its own loops and branches; compiled as C, threads are a loop."""
         return _filled("kernel.cu", self.parts)
 
 
@@ -71,8 +77,8 @@ def lanes_in_c(
     loop, what depends on the step alone once for all points.
 
     Raises:
-        NotImplementedError: the body has loops or branches, which vectors cannot follow, or cannot be printed; with
-            `arithmetic`, it has elementary functions other than roots.
+        NotImplementedError: the body cannot be printed; with `arithmetic`, it has loops, branches, or elementary
+            functions other than roots.
     """
     carry = list(carry)
     while True:
@@ -83,7 +89,7 @@ def lanes_in_c(
         with printing():
             after = evaluated(writer, body, [*operands, *before, *rows])
         results = [atom for array in after for atom in array.ravel()]
-        statements = _straight(pruned(writer.statements, names(results)))
+        statements = pruned(writer.statements, names(results))
         levels = _levels(statements, names_of.levels)
         if arithmetic:
             _refuse_functions(statements, levels)
@@ -92,9 +98,8 @@ def lanes_in_c(
             for operand, array in zip(carry, after, strict=True)
         ]
         if grown == carry:
-            return Loop(
-                _parts(statements, levels, names_of, before, after), tuple(c.level & OF_POINT > 0 for c in carry)
-            )
+            parts = _parts(statements, levels, names_of, before, after)
+            return Loop(parts, tuple(c.level & OF_POINT > 0 for c in carry), _is_straight(statements))
         carry = grown  # what seemed the same for all points is not
 
 
@@ -132,44 +137,50 @@ def _level(atom: Atom | None, levels: dict[str, int]) -> int:
     return levels[atom.name] if isinstance(atom, Variable) else 0
 
 
-def _straight(statements: list[Statement]) -> list[Define | Table]:
-    """The statements, among which are no loops and branches."""
-    straight = [statement for statement in statements if isinstance(statement, Define | Table)]
-    if len(straight) < len(statements):
-        message = "A loop or a branch inside a step cannot be printed for many points side by side."
-        raise NotImplementedError(message)
-    return straight
+def _is_straight(statements: list[Statement]) -> TypeGuard[list[Define | Table]]:
+    """Whether there are no loops and branches among statements."""
+    return all(isinstance(statement, Define | Table) for statement in statements)
 
 
-def _refuse_functions(statements: list[Define | Table], levels: dict[str, int]) -> None:
-    """Refuse elementary functions, other than roots, of each point in each step."""
+def _refuse_functions(statements: list[Statement], levels: dict[str, int]) -> None:
+    """Refuse loops, and elementary functions, other than roots, of each point in each step."""
     for s in statements:
+        if not isinstance(s, Define | Table):
+            raise NotImplementedError("A step with a loop or a branch is not printed where XLA is faster.")
         if isinstance(s, Define) and s.operation in FUNCTIONS - {"sqrt"} and levels[s.target.name] == OF_BOTH:
             raise NotImplementedError(f"A step with the function {s.operation!r} is not printed where XLA is faster.")
 
 
-def _levels(statements: Iterable[Define | Table], known: dict[str, int]) -> dict[str, int]:
+def _levels(statements: Iterable[Statement], known: dict[str, int]) -> dict[str, int]:
+    """What each value depends on; what loops and branches assign is taken to depend on all."""
     levels = dict(known)
     for statement in statements:
-        level = 0
-        for atom in operands_of(statement):
-            level |= _level(atom, levels)
-        levels[statement.target.name] = level
+        if isinstance(statement, Declare):
+            levels[statement.target.name] = OF_BOTH
+        elif isinstance(statement, Define | Table):
+            level = 0
+            for atom in operands_of(statement):
+                level |= _level(atom, levels)
+            levels[statement.target.name] = level
     return levels
 
 
 def _parts(
-    statements: list[Define | Table], levels: dict[str, int], inputs: _Names, before: list[Atoms], after: list[Atoms]
+    statements: list[Statement], levels: dict[str, int], inputs: _Names, before: list[Atoms], after: list[Atoms]
 ) -> dict[str, str | list[str]]:
     printer = _InLanes()
     carried = _carried(before, after)
-    repeated, carried, statements = _with_kept(statements, levels, carried)
-    inside = {name for name, level in levels.items() if level == OF_BOTH}
-    statements = sums_of_products(statements, inside, carried.values())
-    statements, limits = _limited(statements, levels)
-    parts: dict[int, list[Define | Table]] = {level: [] for level in range(4)}
+    repeated, limits = list[Kept](), dict[str, Variable]()
+    if _is_straight(statements):
+        repeated, carried, straight = _with_kept(statements, levels, carried)
+        inside = {name for name, level in levels.items() if level == OF_BOTH}
+        straight = sums_of_products(straight, inside, carried.values())
+        straight, limits = _limited(straight, levels)
+        statements = [*straight]
+    parts: dict[int, list[Statement]] = {level: [] for level in range(4)}
     for statement in statements:
-        parts[levels.get(statement.target.name, OF_BOTH)].append(statement)
+        level = levels.get(statement.target.name, OF_BOTH) if isinstance(statement, Define | Table) else OF_BOTH
+        parts[level].append(statement)
     hoisted = _read_later(parts[OF_POINT], parts[OF_BOTH], carried.values())
     load = [f"const {printer.types[v.dtype]} {v.name} = hoisted[{i}][lane];" for i, v in enumerate(hoisted)]
     store = [f"hoisted[{i}][lane] = {v.name};" for i, v in enumerate(hoisted)]
@@ -191,12 +202,10 @@ def _parts(
     }
 
 
-def _read_later(
-    statements: list[Define | Table], inside: list[Define | Table], results: Iterable[Atom]
-) -> list[Variable]:
+def _read_later(statements: list[Statement], inside: list[Statement], results: Iterable[Atom]) -> list[Variable]:
     """The values of statements that are read in every step."""
-    used = names(results).union(*(names(operands_of(s)) for s in inside))
-    return [s.target for s in statements if s.target.name in used]
+    used = names(results) | names_in(inside)
+    return [s.target for s in statements if isinstance(s, Define | Table) and s.target.name in used]
 
 
 def _carried(before: list[Atoms], after: list[Atoms]) -> dict[str, Atom]:
@@ -228,7 +237,8 @@ def _with_kept(
         atoms = tuple(given.get(a, a) for a in (s.operands if isinstance(s, Define) else s.entries))
         return Define(s.target, s.operation, atoms) if isinstance(s, Define) else Table(s.target, atoms)
 
-    return repeated, carried, _straight(pruned([reading(s) for s in statements], names(carried.values())))
+    left = pruned([reading(s) for s in statements], names(carried.values()))
+    return repeated, carried, [s for s in left if isinstance(s, Define | Table)]
 
 
 def _limited(

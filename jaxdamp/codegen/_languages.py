@@ -17,7 +17,7 @@ from jaxdamp.codegen._program import (
     Table,
     Variable,
     names,
-    operands_of,
+    names_in,
 )
 
 
@@ -247,21 +247,9 @@ class C(AbstractLanguage):
     def _unused(self, printed: PrintedFunction) -> list[str]:
         """Arguments that nothing reads or assigns are named, since compilers warn of them."""
         used = names([value for _, value in printed.outputs]) | names([printed.returned])
-        used |= {text for text, _ in printed.outputs} | _names_in(printed.statements)
+        used |= {text for text, _ in printed.outputs} | names_in(printed.statements)
         roots = {name.split("[")[0].split("->")[0] for name in used}
         return [f"    (void){name};" for name in printed.inputs if name not in roots]
-
-
-def _names_in(statements: Iterable[Statement]) -> set[str]:
-    used: set[str] = set()
-    for statement in statements:
-        if isinstance(statement, Loop):
-            used |= _names_in(statement.body)
-        elif isinstance(statement, Branch):
-            used |= names([statement.case]).union(*map(_names_in, statement.bodies))
-        else:
-            used |= names(operands_of(statement))
-    return used
 
 
 class JavaScript(AbstractLanguage):

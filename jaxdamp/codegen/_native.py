@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import tempfile
 import uuid
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 
@@ -112,13 +113,12 @@ def _folder() -> Path:
 
 
 @functools.cache
-def registered(text: str, platform: str = "cpu", name: str = "") -> str:
-    """The name under which XLA calls the function `loop` of a C text, compiled once in a process.
+def registered(text: str, *functions: tuple[str, str]) -> str:
+    """The name under which XLA calls functions of a C text, compiled once in a process.
 
     Arguments:
         text: C.
-        platform: of XLA, "cpu" or "CUDA".
-        name: another one than that made from the text, under which another platform has the same function.
+        functions: a platform of XLA, "cpu" or "CUDA", and the function for it; `loop` on "cpu" if there are none.
 
     Raises:
         NotImplementedError: no C compiler, or one that refuses the text; no room for temporary files, or none from
@@ -126,14 +126,14 @@ def registered(text: str, platform: str = "cpu", name: str = "") -> str:
     """
     tool = compiled_by()
     try:
-        return _compiled(tool, text, platform, name)
+        return _compiled(tool, text, functions or (("cpu", "loop"),))
     except OSError as error:
         remedy = "Name another folder for temporary files, from which programs may run, in the variable TMPDIR."
         raise NotImplementedError(f"The printed loop cannot be compiled or loaded here ({error}). {remedy}") from error
 
 
-def _compiled(tool: str, text: str, platform: str, name: str) -> str:
-    """Compile a text, load it and tell XLA its name."""
+def _compiled(tool: str, text: str, functions: Sequence[tuple[str, str]]) -> str:
+    """Compile a text, load it and tell XLA the name of its functions."""
     own = f"jaxdamp_loop_{hashlib.sha256(text.encode()).hexdigest()[:20]}"
     source, target = _folder() / f"{own}.c", _folder() / f"{own}.so"
     source.write_text(text, encoding="utf-8")
@@ -142,7 +142,8 @@ def _compiled(tool: str, text: str, platform: str, name: str) -> str:
     for flags, libraries in (([*_FLAGS, *_WIDE], ["-lmvec", "-lm", "-ldl"]), (_FLAGS, ["-lm"])):
         done = subprocess.run([tool, *flags, *where, *libraries], capture_output=True, text=True)
         if done.returncode == 0:
-            function = ctypes.CDLL(str(target)).loop
-            jax.ffi.register_ffi_target(name or own, jax.ffi.pycapsule(function), platform=platform)
-            return name or own
+            library = ctypes.CDLL(str(target))
+            for platform, function in functions:
+                jax.ffi.register_ffi_target(own, jax.ffi.pycapsule(getattr(library, function)), platform=platform)
+            return own
     raise NotImplementedError(f"{tool} does not compile the printed loop: {done.stderr.strip()[-2000:]}")

@@ -306,3 +306,16 @@ def operands_of(statement: Define | Declare | Table | Assign | Leave) -> list[At
 def names(atoms: Iterable[Atom | None]) -> set[str]:
     """The names of the variables among them."""
     return {atom.name for atom in atoms if isinstance(atom, Variable)}
+
+
+def names_in(statements: Iterable[Statement]) -> set[str]:
+    """The names of the variables that statements read, those inside loops and branches too."""
+    used: set[str] = set()
+    for statement in statements:
+        if isinstance(statement, Loop):
+            used |= names_in(statement.body)
+        elif isinstance(statement, Branch):
+            used |= names([statement.case]).union(*map(names_in, statement.bodies))
+        else:
+            used |= names(operands_of(statement))
+    return used

@@ -11,7 +11,7 @@ from jax.custom_batching import custom_vmap
 from jax.extend.core import ClosedJaxpr
 from jaxtyping import Array, PyTree
 
-from jaxdamp.codegen._cuda import register_on_gpu
+from jaxdamp.codegen._cuda import on_gpu, registered_on_gpu
 from jaxdamp.codegen._jaxprs import called, known, with_constants_as_inputs
 from jaxdamp.codegen._lanes import OF_POINT, OF_STEP, Loop, Operand, lanes_in_c
 from jaxdamp.codegen._native import compiled_by, registered
@@ -30,7 +30,7 @@ def printed_scan(
     rows are the same for all points. Only values pass, no derivatives.
 
     Arguments:
-        step: of numbers and small arrays in double precision, without loops and branches inside.
+        step: of numbers and small arrays in double precision; loops and branches inside it run on GPUs only.
         carry: a tree of arrays.
         rows: a tree of arrays, one row for each step along the first axis.
         arithmetic: refuse a step with functions such as exponentials, which are faster in XLA.
@@ -73,7 +73,8 @@ class _Scan:
     def of_one(self, traced: list[Array], start: list[Array], rows: list[Array]) -> list[Array]:
         """One point: no vectors, so it is left to XLA; what cannot be printed is refused all the same."""
         compiled_by()
-        self.loop(([False] * len(traced), [False] * len(start)), traced, start, rows)
+        loop = self.loop(([False] * len(traced), [False] * len(start)), traced, start, rows)
+        _ = loop.kernel if on_gpu() else loop.text  # refused where vectors cannot follow
 
         def stride(carry: list[Array], row: list[Array]) -> tuple[list[Array], None]:
             inputs = iter(traced)
@@ -97,9 +98,7 @@ class _Scan:
         now, state = _stacked(start, loop.laned, size)
         table = jnp.concatenate([jnp.reshape(x, (x.shape[0], -1)) for x in rows], axis=1)
         kinds = [jax.ShapeDtypeStruct(x.shape, x.dtype) for x in (now, state)]
-        name = registered(loop.text)
-        if jax.default_backend() == "gpu":
-            register_on_gpu(loop.kernel, name)
+        name = registered_on_gpu(loop.kernel) if on_gpu() else registered(loop.text)
         printed = jax.ffi.ffi_call(name, kinds, vmap_method="sequential")
         now, state = printed(shared, of_points, now, state, table)
         return _unstacked(now, state, start, loop.laned), list(loop.laned)

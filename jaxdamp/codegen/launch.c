@@ -8,7 +8,13 @@
 #define THREADS 128 /* of a block */
 #define DEVICES 64
 
-static const char ptx[] = {@ptx@, 0};
+#define ELSEWHERE \
+    "This loop was printed for the GPU, and runs on a processor. Trace it where it is to run: `with " \
+    "jax.default_device(jax.devices(\"cpu\")[0]):`."
+
+/* Of each architecture of the GPUs of this process. */
+@images@
+static const void *const images[] = {@names@};
 
 typedef int (*Load)(void **, const void *);
 typedef int (*Find)(void **, void *, const char *);
@@ -18,12 +24,23 @@ typedef int (*ContextOf)(void *, void **);
 typedef int (*Push)(void *);
 typedef int (*Pop)(void **);
 
+static XLA_FFI_Error *says(XLA_FFI_CallFrame *frame, const char *text)
+{
+    XLA_FFI_Error_Create_Args error = {XLA_FFI_Error_Create_Args_STRUCT_SIZE, 0, text, XLA_FFI_Error_Code_INTERNAL};
+    return frame->api->XLA_FFI_Error_Create(&error);
+}
+
 static XLA_FFI_Error *failed(XLA_FFI_CallFrame *frame, const char *what, int code)
 {
     char text[200];
     snprintf(text, sizeof text, "The printed kernel did not run: %s of the CUDA driver failed with code %d.", what, code);
-    XLA_FFI_Error_Create_Args error = {XLA_FFI_Error_Create_Args_STRUCT_SIZE, 0, text, XLA_FFI_Error_Code_INTERNAL};
-    return frame->api->XLA_FFI_Error_Create(&error);
+    return says(frame, text);
+}
+
+/* What a processor answers. */
+XLA_FFI_Error *elsewhere(XLA_FFI_CallFrame *frame)
+{
+    return asks_version(frame) ? 0 : says(frame, ELSEWHERE);
 }
 
 /* The kernel in a context, loaded once for each; two threads that come at once may load it twice, which does no harm. */
@@ -38,7 +55,9 @@ static int function_in(void *context, void *driver, void **function)
             *function = known[i].function;
             return 0;
         }
-    int code = ((Load)dlsym(driver, "cuModuleLoadData"))(&module, ptx);
+    int code = 1;
+    for (size_t i = 0; code && i < sizeof images / sizeof *images; i++) /* the driver refuses other architectures */
+        code = ((Load)dlsym(driver, "cuModuleLoadData"))(&module, images[i]);
     if (!code)
         code = ((Find)dlsym(driver, "cuModuleGetFunction"))(function, module, "steps_of_points");
     for (int i = 0; !code && i < DEVICES; i++)

@@ -88,9 +88,11 @@ from jaxdamp.dampers.spline_table import SplineTable
 from jaxdamp.dampers.spring import Spring
 from jaxdamp.dampers.stribeck_friction import StribeckFriction
 from jaxdamp.dampers.stroke_dependent import StrokeDependent
+from jaxdamp.dampers.stroke_scaled import StrokeScaled
 from jaxdamp.dampers.sum import Scaled as Scaled, Sum as Sum, law_name as law_name
 from jaxdamp.dampers.table import Table, drives_motion as drives_motion
 from jaxdamp.dampers.temperature_scaled import TemperatureScaled
+from jaxdamp.dampers.thinned import Thinned
 from jaxdamp.dampers.twin_tube import TwinTube
 from jaxdamp.dampers.visco_plastic import ViscoPlastic
 from jaxdamp.dampers.wrapper import AbstractWrapper
@@ -143,8 +145,10 @@ __all__ = [
     "Spring",
     "StribeckFriction",
     "StrokeDependent",
+    "StrokeScaled",
     "Table",
     "TemperatureScaled",
+    "Thinned",
     "Traits",
     "TwinTube",
     "ViscoPlastic",

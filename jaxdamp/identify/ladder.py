@@ -33,6 +33,8 @@ from jaxdamp.dampers import (
     SegmentedPolynomial,
     SeriesSpring,
     Spring,
+    StrokeScaled,
+    Thinned,
     ViscoPlastic,
 )
 from jaxdamp.identify.fitting import NUMERICAL
@@ -78,7 +80,18 @@ _MEMORYLESS = {
     "besinger": Besinger.guess,
     "linear_friction": _friction,
 }
-_BESIDE_SPRING = {"lugre_spring": LuGre.guess, "visco_plastic_spring": ViscoPlastic.guess}
+
+
+def _thinned(velocity: np.ndarray, force: np.ndarray) -> AbstractDamper:
+    """Half of the force is lost at the largest velocity, almost at once."""
+    return Thinned(StrokeScaled(ViscoPlastic.guess(velocity, force)), float(np.max(np.abs(velocity))), RECOVERY)
+
+
+_BESIDE_SPRING = {
+    "lugre_spring": LuGre.guess,
+    "visco_plastic_spring": ViscoPlastic.guess,
+    "thinned_visco_plastic": _thinned,
+}
 LEARNT = "neural_hysteresis_spring"
 
 
@@ -114,6 +127,11 @@ NAMED_LAWS = {
     "besinger_play": NamedLaw(True, "besinger behind a clearance: worn joint, loose mount, void in the oil"),
     "series_spring_dahl": NamedLaw(True, "piecewise_linear in series with a spring, elastic friction, a spring"),
     "visco_plastic_spring": NamedLaw(True, "concave viscous force, two yielding elements, a spring"),
+    "thinned_visco_plastic": NamedLaw(
+        True,
+        "visco_plastic_spring whose force falls in motion and changes along the stroke; only by name",
+        optional=True,
+    ),
     "neural_hysteresis_spring": NamedLaw(
         True, "one coefficient, hysteresis learnt by a network, a spring; takes minutes, only by name", optional=True
     ),
@@ -122,6 +140,7 @@ NAMED_LAWS = {
 LAWS = tuple(name for name, law in NAMED_LAWS.items() if not law.optional)
 CURVES = ("bilinear", "besinger", "piecewise_linear")  # tried on all records
 LAGGING, RUBBING = ("besinger_lag", "besinger_series_spring"), ("lugre_spring", "series_spring_dahl")
+RECOVERY = 0.02  # s, short: from 0.3 s fits of records without thinning end at worse minima
 BINS = 30  # of the velocity, in which the halves of a stroke are compared
 LOOP = 2e-3  # share of the squared force that is hysteresis, above which records show a loop
 DRY = 0.5  # share of the loop that is within `SLOW` of the largest velocity: friction that gives before it slides
@@ -191,7 +210,8 @@ def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS, *, rig
     hysteresis: `besinger_lag`, `besinger_series_spring` (paper 001), `linear_friction_lag`, and for friction with
     elastic deformation before sliding, as in magnetorheological dampers, `bouc_wen`, `lugre_spring` and
     `visco_plastic_spring` (with a parallel spring). `besinger_play` has a clearance in series, and `series_spring_dahl`
-    a piecewise-linear law behind a spring, beside friction and a spring. Only if it is named:
+    a piecewise-linear law behind a spring, beside friction and a spring. Only if they are named:
+    `thinned_visco_plastic`, whose force also falls with the recent speed and changes along the stroke, and
     `neural_hysteresis_spring`, trained on the records (`LearntStart`).
 
     If a start cannot be computed from these records, the entry is a function that raises the reason when a fit calls

@@ -9,7 +9,8 @@ What tells causes apart:
   direction by another;
 - the mains have a line, a clock that jitters scatters the force in proportion to its rate of change;
 - no law of the velocity has a force at rest, so that another curve with one is a constant force;
-- a fault of the machine explains all that repeats from cycle to cycle: if some of it is left, it is the law.
+- a fault of the machine explains all that repeats from cycle to cycle: if some of it is left, it is the law. A spring
+  in series is nearly a filter and a mass: the second of two such effects has to explain all that the first left.
 """
 
 from collections.abc import Sequence
@@ -18,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxdamp.bench import clock_jitter, mains_lines
+from jaxdamp.identify.model import is_memoryless
 from jaxdamp.identify.noise import correlation_time
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.residual_patterns import (
@@ -41,6 +43,7 @@ MOVED = 3.0  # standard errors by which such a small one must move the fitted nu
 AS_GOOD = 12.0  # deviance above the least, within which the first effect in the order of the list is named
 PENALTY = 2.0  # deviance for each further number of an effect, in logarithms of the number of independent samples
 OF_THE_LAW = 0.01  # of what repeats from cycle to cycle, above which effects of a machine do not explain it
+OF_PHASE = ("delay", "lag", "mass")  # effects that shift the phase, as memory of a damper does
 SURE = 5.0  # standard errors from which something repeats
 SCATTER = 0.2  # share of the squared residual by a clock that jitters, from which it is named
 STATIC = 0.5  # force at rest, relative to its RMS, from which another curve is a constant force
@@ -63,12 +66,8 @@ class _Named(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Share and size.
-
-        Shares below one percent keep a digit.
-        """
-        share = f"{100 * self.share:.0f}" if self.share >= 0.01 else f"{100 * self.share:.1g}"
-        return f"{share} % {{}} like {self.effect.words(self.sizes)}"
+        """Share and size."""
+        return f"{_percent(self.share)} % {{}} like {self.effect.words(self.sizes)}"
 
 
 def left_out(problem: Problem, best: SearchEnd) -> list[str]:
@@ -94,28 +93,43 @@ def left_out(problem: Problem, best: SearchEnd) -> list[str]:
     of_mains, residual, span = _mains(problem, records, residual, span)
     of_clock = _jitter(problem, records, squares)
     named = _search(problem, records, residual, span, squares, SCATTER if of_clock else 0.0)
+    asked = _to_explain(named, repeated, records)
     if named:
         residual = named[-1].rest
     left, alike = _repeated(residual, records), _alike(residual, records)
     sure = SURE * float(residual @ residual) * np.sqrt(alike / residual.size)
     static = [found.effect.name for found in named] == ["offset"]
     if (named and named[-1].effect.name in OF_LAW) or (
-        not static and repeated > 0 and left > max(OF_THE_LAW * repeated, sure)
+        not static and repeated > 0 and left > max(OF_THE_LAW * asked, sure)
     ):
-        return [*of_clock, _of_the_law(named, left / repeated if repeated > 0 else 1.0), *of_mains]
+        of_law = _of_the_law(named, left / repeated if repeated > 0 else 1.0, is_memoryless(problem.law))
+        return [*of_clock, of_law, *of_mains]
     looks = ((one.words.format("of the squared residual look"), one.effect.remedy) for one in named)
     return [*of_clock, *(f"{look}, which the fit leaves out: {remedy}." for look, remedy in looks), *of_mains]
 
 
-def _of_the_law(named: Sequence[_Named], left: float) -> str:
+def _to_explain(named: Sequence[_Named], repeated: float, records: Sequence[Record]) -> float:
+    """What repeats that a machine has to explain: of several effects that shift the phase, that before the last."""
+    shifts = [i for i, found in enumerate(named) if found.effect.name in OF_PHASE]
+    return _repeated(named[shifts[-1] - 1].rest, records) if len(shifts) > 1 else repeated
+
+
+def _percent(share: float) -> str:
+    """In whole percent; shares below one percent keep a digit."""
+    return f"{100 * share:.0f}" if share >= 0.01 else f"{100 * share:.1g}"
+
+
+def _of_the_law(named: Sequence[_Named], left: float, memoryless: bool) -> str:
+    """A sentence on what the law misses; a law with memory is not told to become one without."""
     parts = [found.words.format("is") for found in named if found.effect.name not in OF_LAW]
     alike = f" (of the squared residual {', '.join(parts)})" * bool(parts)
     if named and named[-1].effect.name in OF_LAW:
         effect = named[-1].effect
-        return f"By the residual, the law misses {effect.words(named[-1].sizes)}{alike}: {effect.remedy}. {LAST_WORD}"
+        remedy = f": {effect.remedy}" * memoryless
+        return f"By the residual, the law misses {effect.words(named[-1].sizes)}{alike}{remedy}. {LAST_WORD}"
     return (
-        f"The residual repeats from cycle to cycle, and {100 * min(left, 1.0):.0f} % of that is like no fault of a"
-        f" machine{alike}: the law misses something of the damper. {LAST_WORD}"
+        f"The residual repeats from cycle to cycle, and no effect of the test machine explains"
+        f" {_percent(min(left, 1.0))} % of that{alike}: the law misses something of the damper. {LAST_WORD}"
     )
 
 

@@ -25,7 +25,15 @@ from jaxdamp.identify.lanes import Fitted, LanePriors, Lanes, Products, by_round
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import Machine
 from jaxdamp.identify.many_blocks import fit_into_store
-from jaxdamp.identify.many_records import Options, begun_on, by_name, fitted_records, refuse_several_laws
+from jaxdamp.identify.many_records import (
+    AllRecords,
+    Beginning,
+    Options,
+    begun_on,
+    by_name,
+    fitted_records,
+    refuse_several_laws,
+)
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.model import initial_state_for, own_names, rig_of
 from jaxdamp.identify.preparing import weights
@@ -125,35 +133,56 @@ def fit_many(
     stated = None if settings is None else tuple(map(float, settings))
     how = {"rig": rig, "freeze": freeze, "bounds": bounds, "tie": tie, "weighting": weighting, "loss": loss}
     how |= {"priors": priors, "initial_state": initial_state, "samples_per_cycle": samples_per_cycle}
-    how |= {"max_steps": max_steps, "bad_records": bad_records}
+    how |= {"max_steps": max_steps, "bad_records": bad_records, "starts": starts}
     by_names = by_name(dampers)
     if file is not None or cluster is not None:
-        how |= {"starts": starts}
         return fit_into_store(law, by_names, stated, file, cluster, progress, shared=bool(shared), options=how)
-    names, records = tuple(by_names), [fitted_records(name, runs, how) for name, runs in by_names.items()]
-    some = [run for runs in records[:: -(-len(records) // STARTED_FROM)] for run in runs]
-    begun, _, model, _, free = begun_on(law, some, how, shared)
-    for name, runs in zip(names, records, strict=True):
-        refuse_several_laws(name, runs, model, how)
-    named = own_names(model)
-    priors = named.find_keys("priors", priors)
+    records = {name: fitted_records(name, runs, how) for name, runs in by_names.items()}
+    some = list(records.values())[:: -(-len(records) // STARTED_FROM)]
+    begin = begun_on(law, [run for runs in some for run in runs], how, shared)
+    for name, runs in records.items():
+        refuse_several_laws(name, runs, begin.model, how)
+    return fitted_together(begin, records, how, shared, stated)
+
+
+@one_thread()
+def fitted_together(
+    begin: Beginning,
+    dampers: AllRecords,
+    options: Options,
+    shared: Mapping[str, int] | Sequence[str] = (),
+    settings: tuple[float, ...] | None = None,
+) -> ManyFits:
+    """The fits of dampers from a start that is resolved.
+
+    Arguments:
+        begin: of all dampers.
+        dampers: the records that the fits take, by name.
+        options: of `fit_many`.
+        shared: as in `fit_many`.
+        settings: of the dampers.
+    """
+    free, records = begin.free, tuple(dampers.values())
+    named = own_names(begin.model)
+    priors = named.find_keys("priors", options["priors"])
     degrees = shared if isinstance(shared, Mapping) else dict.fromkeys(name_patterns("shared", shared), 0)
-    depends = dependence(free, named.find_keys("shared", degrees), stated, len(names))
-    how |= {"bad_records": "keep"}
-    many = functools.partial(ManyFits, names, tuple(records), stated, free=free, options=how)
-    initial_state = initial_state_for(model, initial_state)
+    depends = dependence(free, named.find_keys("shared", degrees), settings, len(dampers))
+    how = {**options, "bad_records": "keep"}
+    many = functools.partial(ManyFits, tuple(dampers), records, settings, free=free, options=how)
+    initial_state = initial_state_for(begin.model, options["initial_state"])
     if initial_state == "estimated":
         if depends is not None:
             remedy = "Leave out `shared`, or take another `initial_state`."
             _checks.refuse("initial_state", "be the same for dampers that share parameters", "'estimated'", remedy)
-        return many(**_one_by_one(records, begun, free, how | {"starts": starts}))
-    sigma = [weights(weighting, runs) for runs in records]
-    groups = grouped_records(model, records, sigma, samples_per_cycle, initial_state)
-    lanes = Lanes(Coordinates(free, smooth="ordered"), groups, np.arange(len(names)))
+        return many(**_one_by_one(records, begin.law, free, how))
+    sigma = [weights(options["weighting"], runs) for runs in records]
+    groups = grouped_records(begin.model, records, sigma, options["samples_per_cycle"], initial_state)
+    lanes = Lanes(Coordinates(free, smooth="ordered"), groups, np.arange(len(dampers)))
     if priors:
         noise = FIRST_NOISE * lanes.levels() / np.sqrt(lanes.samples())
         lanes = lanes._replace(priors=LanePriors(_once(priors_on(free, priors, 1.0)[0], free, depends), noise))
-    return many(dependence=depends, **_side_by_side(lanes, records, depends, loss, starts, max_steps))
+    how_far = options["loss"], options["starts"], options["max_steps"]
+    return many(dependence=depends, **_side_by_side(lanes, records, depends, *how_far))
 
 
 def _side_by_side(

@@ -88,16 +88,15 @@ class DamperFits(AbstractWork):
 
     def _fitted(self, records: AllRecords) -> dict[str, dict[str, object]]:
         """What is stored of each damper; if the fit of all together raises, those of its halves, to leave one out."""
-        from jaxdamp.identify.many import fit_many  # which hands its blocks to this file
+        from jaxdamp.identify.many import fitted_together  # of `fit_many`, which hands its blocks to this file
 
         if not records:
             return {}
-        names, begin = list(records), self._beginning
-        how = {**self._options, "rig": begin.rig, "freeze": begin.freeze, "bad_records": "keep"}
+        names = list(records)
         size = len(names) if len(names) < SETTLED else 2 ** (len(names) - 1).bit_length()
         further = {f"{names[-1]} ({i})": records[names[-1]] for i in range(size - len(names))}  # compiles nothing new
         try:
-            many = fit_many(begin.law, {**records, **further}, **how)
+            many = fitted_together(self._beginning, {**records, **further}, self._options)
         except MemoryError:
             raise
         except Exception as error:

@@ -14,7 +14,6 @@ from jaxdamp.identify.model import Model, on_rig, own_names
 from jaxdamp.identify.starting import Start
 from jaxdamp.identify.stated import start_paths, stated_parameters, stated_values
 from jaxdamp.parameters import FreeParameters, free_parameters
-from jaxdamp.rig import Rig
 
 
 CALL = 'fit_many(law, {"A": runs_of_a, "B": runs_of_b})'
@@ -71,9 +70,7 @@ class Beginning(NamedTuple):
     """Where the fits of all dampers start."""
 
     law: AbstractDamper
-    rig: Rig | None
-    model: Model  # of both
-    freeze: tuple[str, ...]
+    model: Model  # with the machine
     free: FreeParameters
 
 
@@ -97,4 +94,4 @@ def begun_on(law: Start, runs: Sequence[BenchRun], options: Options, shared: Ite
     limits, tied = names.find_keys("bounds", bounds), names.find_keys("tie", tie)
     free = free_parameters(model, freeze=freeze, bounds=limits, tie=tied)
     _checks.finite("law", free.values)
-    return Beginning(begun, machine, model, (*options["freeze"], *held), free)
+    return Beginning(begun, model, free)

@@ -126,7 +126,8 @@ class ManyFits(AbstractResult):
         from jaxdamp.identify.fitting import fit  # which hands many dampers to `fit_many`
 
         _checks.one_of("name", name, self.names)
-        return fit(self[name], self.records[self.names.index(name)], **{**self.options, **options})
+        options = {**self.options, "starts": None, **options}
+        return fit(self[name], self.records[self.names.index(name)], **options)
 
     def law_at(self, setting: float, blend: str | None = None) -> AbstractDamper:
         """The law at a setting between those of the dampers.

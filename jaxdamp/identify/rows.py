@@ -11,10 +11,11 @@ from jaxtyping import Array, Bool
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun
 from jaxdamp.identify.initial_states import Cycle, moving_samples, repeated_motion, start_of
-from jaxdamp.identify.model import Model, blind_end, law_of
+from jaxdamp.identify.model import Model, blind_end, effects_of, law_of
 
 
 COARSEST = 0.48  # rad between samples, beyond which straight lines between them are the larger error
+LAG_ANGLE = 0.02  # rad, largest step of a filter of the force, whose law bends between samples where a valve opens
 
 
 class Row(NamedTuple):
@@ -111,7 +112,8 @@ def row_of(
     omega = dominant_rate(run)
     block = samples_in_block(run, samples_per_cycle)
     dt = block / run.sampling_rate
-    substeps = max(int(np.ceil(min(omega * dt, COARSEST) / law_of(model).traits().step_angle)), 1)
+    angles = [law_of(model).traits().step_angle, *[LAG_ANGLE] * ("lag" in effects_of(model))]
+    substeps = max(int(np.ceil(min(omega * dt, COARSEST) / min(angles))), 1)
     start = start_of(run, initial_state)
     warm_up = 0 if start in ("rest", "estimated") else int(min(2 * np.pi / omega, run.duration) / dt)
     signals = [averaged(values, block) for values in _with_warm_up(run, warm_up * block, channels)]

@@ -24,7 +24,7 @@ from jaxdamp.identify.noise import Noise, channel_noise
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd, Solver, search
 from jaxdamp.identify.several import Solution, search_scattered
-from jaxdamp.identify.vehicle_left_out import friction_left_out, on_free_scale, on_sensors, on_signs
+from jaxdamp.identify.vehicle_left_out import friction_left_out, on_free_scale, on_sensors, on_signs, on_units
 from jaxdamp.identify.vehicle_preparing import (
     FreeScale,
     VehicleData,
@@ -255,9 +255,9 @@ def _judged(
     estimates = estimate(problem, solution, noise)
     model = mean_over_records(model, data.per_record)
     scores = channel_scores(problem, end.residual, data.rides)
-    signs = on_signs(scores, at_start)
+    signs = [*on_signs(scores, at_start), *on_units(at_start, model.sensors)]
     notes = [*on_status(end), *refused, *on_free_scale(scale, model), *signs, *estimates.notes]
-    if not signs:  # what a reversed channel looks like is no lag of a sensor, and what friction looks like neither
+    if not signs:  # what such a channel looks like is no lag of a sensor, and what friction looks like neither
         friction = friction_left_out(problem, end) if noise.inflation > 1.0 else None
         notes += [friction.sentence] if friction else []
         known = [end.jacobian, friction.columns] if friction else [end.jacobian]

@@ -30,6 +30,8 @@ SURE = 6.0  # standard errors from which an effect is named
 NOTICEABLE = 0.01  # sampling intervals of a delay, and tenths of a channel, below which an effect does not matter
 REVERSED = -0.3  # correlation of a channel with its prediction below which its sign is doubted
 POORLY = 30.0  # fit [%] of a channel below which the vehicle of the start is asked too
+ANOTHER_UNIT = 4.0  # times a channel of the vehicle of the start, whose numbers are within a factor of two
+ALIKE = 0.7  # correlation from which a channel is the one of the vehicle, in another unit
 OF_ITS_OWN = 1e-3  # share of an effect that no fitted number has, below which it cannot be shown
 
 
@@ -51,6 +53,23 @@ def on_signs(scores: Sequence[ChannelScore], at_start: Sequence[ChannelScore]) -
                 " extension; `read_rides(..., reversed_channels=[...])` and --reversed turn a channel round."
             )
     return notes
+
+
+def on_units(at_start: Sequence[ChannelScore], known: Mapping[str, Sensor]) -> list[str]:
+    """A sentence on each channel that is like that of the vehicle of the start, but several times as large or small.
+
+    Arguments:
+        at_start: scores of the vehicle that the fit started from.
+        known: the sensors, of which those with a gain of their own may have any.
+    """
+    return [
+        f"{score.channel} of {score.record} is {score.size:.2g} times what the vehicle of the start shows: its unit, or"
+        " that of the other channels, is wrong, or the start is far off. State units by `read_rides(..., units={...})`."
+        for score in at_start
+        if "gain" not in (known[score.channel].given if score.channel in known else ())
+        and max(score.size, 1.0 / max(score.size, 1e-300)) > ANOTHER_UNIT
+        and abs(score.correlation) > ALIKE
+    ]
 
 
 def on_free_scale(scale: FreeScale, model: VehicleTest) -> list[str]:

@@ -34,6 +34,7 @@ class ChannelScore(NamedTuple):
         fit_percent: 100 is perfect, 0 no better than a constant [%].
         largest_error: largest magnitude of the error, in the unit.
         correlation: of the measured and the computed channel.
+        size: of the measured channel, as a multiple of the computed one (standard deviations).
     """
 
     record: str
@@ -43,6 +44,7 @@ class ChannelScore(NamedTuple):
     fit_percent: float
     largest_error: float  # in the unit
     correlation: float  # of the predicted with the measured values
+    size: float = 1.0  # standard deviation of the measured values by that of the predicted ones
 
 
 @dataclasses.dataclass(frozen=True, repr=False, kw_only=True)
@@ -160,7 +162,7 @@ class VehicleFit(Fit):
         """The errors of each channel of each record."""
         columns = [Column("record"), Column("channel"), Column("unit"), Column("RMSE", spec=".3g")]
         columns += [Column("fit", "%", ".1f"), Column("largest error", spec=".3g")]
-        return Table("Channels", tuple(columns), tuple(tuple(score)[:-1] for score in self.scores))
+        return Table("Channels", tuple(columns), tuple(tuple(score)[:-2] for score in self.scores))
 
     def parameters_table(self) -> Table:
         """`table()`."""
@@ -229,9 +231,10 @@ def channel_scores(
     return (*[scores[key] for key in sorted(scores)], *on_bench)
 
 
-def figures(measured: np.ndarray, error: np.ndarray) -> tuple[float, float, float, float]:
-    """RMSE, fit percent, largest error, and correlation of predicted and measured values."""
+def figures(measured: np.ndarray, error: np.ndarray) -> tuple[float, float, float, float, float]:
+    """RMSE, fit percent, largest error, correlation and ratio of measured and predicted values."""
     percent = fit_percent([measured], [measured + error])
-    sizes = np.std(measured) * np.std(measured + error)
-    alike = float(np.mean((measured - measured.mean()) * (measured + error)) / sizes) if sizes > 0 else 0.0
-    return float(np.sqrt(np.mean(error**2))), percent, float(np.abs(error).max()), alike
+    spread, predicted = float(np.std(measured)), float(np.std(measured + error))
+    product = np.mean((measured - measured.mean()) * (measured + error))
+    alike, size = (float(product / (spread * predicted)), spread / predicted) if spread * predicted > 0 else (0.0, 1.0)
+    return float(np.sqrt(np.mean(error**2))), percent, float(np.abs(error).max()), alike, size

@@ -12,7 +12,7 @@ from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar, Signal, SignalLike, State
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import AbstractDeclared, Domain, as_float, nonnegative, parameter, positive, setting
-from jaxdamp.rig.marching import NOTHING, Followed, march, slopes, step_and_rate
+from jaxdamp.rig.marching import NOTHING, Followed, finer, march, slopes, step_and_rate
 from jaxdamp.rig.response import respond
 from jaxdamp.rig.sensor import delayed, delayed_straight, lagged
 
@@ -43,6 +43,10 @@ class Readings(NamedTuple):
 
     force: Signal
     temperature: Signal
+
+    def every(self, parts: int) -> "Readings":
+        """Only the first of so many instants each."""
+        return self if parts == 1 else Readings(self.force[::parts], self.temperature[::parts])
 
 
 @final
@@ -137,7 +141,8 @@ class Rig(AbstractDeclared):
             temperature: measured temperature of the damper [K], shape (time,), in place of that which the dissipated
                 energy gives.
             command: measured command of a law that takes one, shape (time,), which acts behind the actuator's lag.
-            substeps: steps of a law with states from one instant to the next.
+            substeps: steps from one instant to the next, of a law with states and of a lag of the force, between which
+                stroke and velocity are interpolated by cubics.
 
         Returns:
             Force and temperature.
@@ -153,10 +158,15 @@ class Rig(AbstractDeclared):
             for name, values in (("temperature", temperature), ("command", command))
         )
         motion = self.delayed_motion(self.effects(), dt, stroke, rate)
-        acting = Followed(temperature, self.acting(self.effects(), dt, command)).of(law)
+        acting = Followed(temperature, self.acting(self.effects(), dt, command))
+        parts = substeps if "lag" in self.effects() else 1
+        if parts > 1:
+            dt, motion, acting = finer(dt, *motion, acting, parts)
+            time, substeps = time[0] + dt * jnp.arange(motion[0].size, dtype=time.dtype), 1
+        warm, acting = acting.temperature, acting.of(law)
         start, inside = acting.first(law).initial_state(), motion[0] - self.stroke_offset
         law_force = respond(law, time, inside, motion[1], state=start, **acting._asdict(), substeps=substeps)
-        return _readings(self, self.effects(), law_force, dt, *motion, temperature)
+        return _readings(self, self.effects(), law_force, dt, *motion, warm).every(parts)
 
     def march(
         self,
@@ -170,10 +180,13 @@ class Rig(AbstractDeclared):
         state: State | None = None,
     ) -> Readings:
         """`readings` without its checks, for use inside compiled functions, with the `effects` known outside."""
-        stroke, velocity = self.delayed_motion(effects, dt, stroke, velocity)
+        motion = self.delayed_motion(effects, dt, stroke, velocity)
         acting = followed._replace(command=self.acting(effects, dt, followed.command))
-        force = march(law, dt, stroke - self.stroke_offset, velocity, substeps, acting, state)
-        return _readings(self, effects, force, dt, stroke, velocity, followed.temperature)
+        parts = substeps if "lag" in effects else 1
+        if parts > 1:
+            (dt, motion, acting), substeps = finer(dt, *motion, acting, parts), 1
+        force = march(law, dt, motion[0] - self.stroke_offset, motion[1], substeps, acting, state)
+        return _readings(self, effects, force, dt, *motion, acting.temperature).every(parts)
 
     def acting(self, effects: tuple[str, ...], dt: Scalar, command: Signal | None) -> Signal | None:
         """The command that the law has, behind the actuator's lag, at the instants whose force the channel shows."""

@@ -130,9 +130,7 @@ def march_states(
     state = followed.first(law).initial_state() if state is None else state
     if state.size == 0:
         return jax.vmap(force, (0, 0, None, 0, 0))(stroke, velocity, state, warm, commands), state
-    fine_x = _refine(stroke, dt * velocity, substeps)
-    fine_v = _refine(velocity, dt * slopes(velocity, dt), substeps)
-    h = dt / substeps
+    h, (fine_x, fine_v), _ = finer(dt, stroke, velocity, NOTHING, substeps)
 
     def sample(state: Array, inputs: tuple[_Ends, Array | None]) -> tuple[Array, Array]:
         ends, warm = inputs
@@ -189,6 +187,27 @@ def _refine(values: Signal, steps: Signal, parts: int) -> Float[Array, " fine"]:
     ends = (values[:-1, None], steps[:-1, None], values[1:, None], steps[1:, None])
     fine = hermite(ends, (jnp.arange(parts) / parts)[None, :])
     return jnp.append(jnp.ravel(fine), values[-1])
+
+
+def finer(
+    dt: Array, stroke: Signal, velocity: Signal, followed: Followed, parts: int
+) -> tuple[Array, tuple[Signal, Signal], Followed]:
+    """Step [s], motion and channels with so many instants for each: the motion by cubics, the channels straight.
+
+    Arguments:
+        dt: step [s].
+        stroke: [m], shape (time,).
+        velocity: [m/s], shape (time,).
+        followed: measured channels beside it.
+        parts: of each step.
+    """
+
+    def straight(values: Signal) -> Signal:
+        places = jnp.arange((values.size - 1) * parts + 1, dtype=values.dtype) / parts
+        return jnp.interp(places, jnp.arange(values.size, dtype=values.dtype), values)
+
+    motion = _refine(stroke, dt * velocity, parts), _refine(velocity, dt * slopes(velocity, dt), parts)
+    return dt / parts, motion, Followed(*(None if channel is None else straight(channel) for channel in followed))
 
 
 def hermite(ends: tuple[Array, Array, Array, Array], s: Array) -> Array:

@@ -25,8 +25,10 @@ from jaxdamp.dampers import (
     SeriesSpring,
     Spring,
     StrokeDependent,
+    StrokeScaled,
     Sum,
     TemperatureScaled,
+    Thinned,
 )
 from jaxdamp.parameters import free_parameters
 from jaxdamp.rig import march
@@ -46,6 +48,8 @@ WRAPPERS: dict[str, Wrap] = {
     "Linkage(law, ...)": lambda law: Linkage(law, [-0.004, 0.0, 0.005], [0.7, 0.8, 0.9]),
     "TemperatureScaled(law, ...)": lambda law: TemperatureScaled(law, 313.15),
     "Scheduled((law, law), ...)": lambda law: Scheduled((law, law), [0.0, 1.0], 0.4),
+    "StrokeScaled(law, ...)": lambda law: StrokeScaled(law, -3.0, 200.0),
+    "Thinned(law, ...)": lambda law: Thinned(law, 0.2, 0.05),
     "Heated(law, ...)": lambda law: Heated(law, 0.01, 1.0, heat_capacity=10.0),
     "Lag(law, ...)": lambda law: Lag(law, 0.004),
 }
@@ -68,6 +72,7 @@ def expected_forces(force: np.ndarray, stroke: np.ndarray) -> dict[str, np.ndarr
         "0.7 * law": 0.7 * force,
         "law + Spring(...) + law": 2.0 * force + 1e3 * stroke,
         "TemperatureScaled(law, ...)": (1.0 - 0.002 * 20.0) * force,
+        "StrokeScaled(law, ...)": np.exp((200.0 * stroke - 3.0) * stroke) * force,
         "Scheduled((law, law), ...)": force,
     }
 

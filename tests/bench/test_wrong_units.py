@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,6 +25,19 @@ WRONG: dict[str, tuple[str, Callable[[BenchRun], BenchRun], str]] = {
     "kN taken for N": ("force", lambda run: made.of_force(run, 1e-3), 'units={"force": "kN"}'),
 }
 LBF = 4.4482216
+# in files: the numbers of the time in seconds, the header, what the error says, the remedy
+IN_FILES: dict[str, tuple[Callable[[BenchRun], np.ndarray], str, str, str]] = {
+    "ms": (lambda run: 1e3 * run.time, "time [s]", "ms taken for s", '`units={"time": "ms"}`'),
+    "s": (lambda run: run.time, "time [ms]", "s taken for ms", '`units={"time": "s"}`.'),
+    "us": (lambda run: 1e6 * run.time, "time [ms]", "us taken for ms", '`units={"time": "us"}`'),
+    "samples": (
+        lambda run: np.arange(1.0, len(run) + 1.0),
+        "time [s]",
+        "ms taken for s",
+        'if it counts samples, with `columns={"time": None}` and `sampling_rate=...`.',
+    ),
+    "min": (lambda run: run.time / 60.0, "time [s]", "min taken for s", '`units={"time": "min"}`.'),
+}
 
 
 def is_refused(name: str, run: BenchRun) -> bool:
@@ -36,6 +50,37 @@ def is_refused(name: str, run: BenchRun) -> bool:
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_unit_is_an_error_that_names_it(name: str) -> None:
     assert all(is_refused(name, made.clean(seed)) for seed in range(7))
+
+
+def is_refused_in_file(name: str, run: BenchRun, file: Path) -> bool:
+    """Whether the only error of a file with such a time names its unit and how to read it again."""
+    numbers, header, said, remedy = IN_FILES[name]
+    columns = np.column_stack([numbers(run), 1e3 * run.stroke, run.force])
+    np.savetxt(file, columns, "%.10g", ",", header=f"{header},stroke [mm],force [N]", comments="")
+    errors = preflight(bench.read(file, sign="rebound-positive")).of("error")
+    return [(f.name, said in f.message, remedy in f.remedy) for f in errors] == [("unit of time", True, True)]
+
+
+@pytest.mark.parametrize("name", IN_FILES)
+def test_the_unit_that_a_file_states_tells_which_one_it_is(name: str, tmp_path: Path) -> None:
+    assert all(is_refused_in_file(name, made.clean(seed), tmp_path / "run.csv") for seed in (1, 8))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", IN_FILES)
+def test_the_unit_of_the_time_of_files_is_found_in_30(name: str, tmp_path: Path) -> None:
+    """Minutes taken for seconds only in fast tests: a slow one is 60 times faster then, and still usual."""
+    runs = [made.clean(seed, "random" if name == "min" else None) for seed in range(30)]
+    assert sum(is_refused_in_file(name, run, tmp_path / "run.csv") for run in runs) >= 29
+
+
+def test_a_rate_that_is_wrong_by_1000_is_the_rate_not_a_column(tmp_path: Path) -> None:
+    run, file = made.clean(1), tmp_path / "run.csv"
+    columns = np.column_stack([1e3 * run.stroke, run.force])
+    np.savetxt(file, columns, delimiter=",", header="stroke [mm],force [N]", comments="")
+    read = bench.read(file, sign="rebound-positive", sampling_rate=1e3 * run.sampling_rate)
+    (error,) = preflight(read).of("error")
+    assert error.name == "unit of time" and "sampling_rate=" in error.remedy and "units=" not in error.remedy
 
 
 @pytest.mark.slow

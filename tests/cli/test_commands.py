@@ -171,6 +171,7 @@ def test_columns_units_and_sampling_rate_read_a_file_without_header(tmp_path: Pa
 def test_laws_may_be_divided_by_commas() -> None:
     assert law_names(["linear, besinger", "bilinear", "linear"]) == ["linear", "besinger", "bilinear"]
     assert law_names(["linear,all"]) == list(identify.LAWS)
+    assert law_names(["all,thinned_visco_plastic"]) == [*identify.LAWS, "thinned_visco_plastic"]
     with pytest.raises(ValueError, match="Did you mean 'besinger'"):
         law_names(["linear,besingr"])
 

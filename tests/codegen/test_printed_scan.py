@@ -1,6 +1,9 @@
 """Loops over steps printed as C for many points side by side give the numbers of `jax.lax.scan`."""
 
+import ctypes
+import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import jax
 import jax.numpy as jnp
@@ -9,7 +12,7 @@ import pytest
 
 from jaxdamp import Ride, roads, sweep, vehicles
 from jaxdamp.codegen import _cuda, _lanes, _native, _scan, compiler, printed_scan
-from jaxdamp.dampers import Besinger, PowerLaw, SeriesSpring
+from jaxdamp.dampers import Besinger, BoucWen, Lag, PowerLaw, SeriesSpring
 from jaxdamp.simulation import Exponential, simulate
 from jaxdamp.sweeps import running
 
@@ -109,22 +112,80 @@ def test_the_kernel_compiled_as_c(monkeypatch):
     jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-12), printed, plain)
 
 
-def test_the_kernel_compiled_as_ptx(monkeypatch):
-    """All of a thread stays in registers, and the function that launches it compiles."""
+def with_its_loops(law):
+    """The kernel of some steps of a ride, compiled as C in place of vectors, beside the numbers of XLA."""
+    car, over = vehicles.presets.quarter_car_000(law), {"sprung_mass": np.linspace(250.0, 300.0, 5)}
+    metric, engines = "rms_sprung_acceleration", [Exponential(printed=p) for p in (False, True)]
+    plain, printed = (sweep(Ride(car, ROAD, metrics=[metric], duration=0.1, engine=e), over)[metric] for e in engines)
+    np.testing.assert_allclose(printed, plain, rtol=1e-10)
+
+
+# registers of a thread, of 255, and bytes that do not fit into them
+LAWS = {
+    "lag": (lambda law: Lag(law, 0.005), 180, 0),
+    "series_spring": (lambda law: SeriesSpring(law, 1e6, 1e8), 220, 0),  # with loops
+    "bouc_wen": (lambda law: BoucWen(1500.0, 2000.0, 300.0, 1e-3, exponent=1.5), 200, 0),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LAWS)
+def test_the_kernel_of_a_ride(monkeypatch, name):
+    """The numbers of XLA from the text that a GPU runs, with its own loops; all of a thread stays in registers."""
     loops = []
-    text = _lanes.Loop.text.fget
-    assert text is not None
-    monkeypatch.setattr(_lanes.Loop, "text", property(lambda loop: (loops.append(loop), text(loop))[1]))
-    jax.vmap(oscillator(printed_scan))(jnp.linspace(0.5, 3.0, 5))
-    kernel = loops[-1].kernel
-    try:
-        found = [_cuda.ptx(kernel, architecture) for architecture in ("compute_80", "compute_90")]
-    except NotImplementedError as error:
-        pytest.skip(str(error))
-    assert all(b".entry steps_of_points" in text and b".local" not in text for text in found)
-    assert _native.registered(_cuda.launcher(kernel, "compute_90"), "CUDA").startswith("jaxdamp_loop_")
+    monkeypatch.setattr(_lanes.Loop, "text", property(lambda loop: (loops.append(loop), loop.kernel)[1]))
+    law, registers, spilt = LAWS[name]
+    with_its_loops(law(CAR.damper))
+    for architecture in (80, 90):
+        used = usage(loops[-1].kernel, architecture)
+        assert used[0] <= registers and used[1] <= spilt, used
+
+
+def usage(text, architecture):
+    """Registers of a thread and bytes spilt."""
+    report = _cuda.kernel(text, architecture).report
+    return [int(re.findall(pattern, report)[0]) for pattern in (r"Used (\d+) registers", r"(\d+) bytes spill stores")]
+
+
+def test_the_kernel_for_a_device(monkeypatch):
+    """Compiled for its own architecture; what launches it compiles, and refuses to run on a processor."""
+    pytest.importorskip("nvidia.cuda_nvrtc")
+    devices = [SimpleNamespace(platform="gpu", compute_capability=number) for number in ("8.0", "9.0", "9.0")]
+    kernels = []
+    monkeypatch.setattr(_cuda.jax, "local_devices", lambda: devices)
+    monkeypatch.setattr(_cuda.jax, "default_backend", lambda: "gpu")
+    monkeypatch.setattr(
+        _cuda, "launcher", lambda images, real=_cuda.launcher: (kernels.append(images), real(images))[1]
+    )
+    with pytest.raises(jax.errors.JaxRuntimeError, match=r"printed for the GPU, and runs on a processor.*default_dev"):
+        jax.block_until_ready(jax.vmap(oscillator(printed_scan))(jnp.linspace(0.5, 3.0, 5)))
+    assert [image[:4] for image in kernels[0]] == [b"\x7fELF"] * 2 and kernels[0][0] != kernels[0][1]
+    with jax.default_device(jax.devices("cpu")[0]):
+        assert not _cuda.on_gpu()
+
+
+def test_the_right_compiler_of_several(monkeypatch):
+    def installed(*versions):
+        found = [_cuda.Compiler(ctypes.CDLL(None), (major, 0), frozenset(known)) for major, known in versions]
+        monkeypatch.setattr(_cuda, "compilers", lambda: found)
+
+    installed((12, [80, 90]), (13, [90, 100]), (11, [80]))
+    monkeypatch.setattr(_cuda, "driver_version", lambda: None)
+    assert [_cuda.compiler_for(a).version[0] for a in (80, 90, 100)] == [12, 13, 13]
+    monkeypatch.setattr(_cuda, "driver_version", lambda: (12, 4))
+    assert [_cuda.compiler_for(a).version[0] for a in (80, 90)] == [12, 12]
+    message = r"for sm_100 and a driver of CUDA 12\.4: installed: 12\.0 \(up to sm_90\), 13\.0 \(up to sm_100\)"
+    with pytest.raises(NotImplementedError, match=message):
+        _cuda.compiler_for(100)
+    installed()
+    with pytest.raises(NotImplementedError, match=r"none is installed\. Install `nvidia-cuda-nvrtc-cu12`"):
+        _cuda.compiler_for(90)
+
+
+def test_a_text_that_is_no_kernel():
+    pytest.importorskip("nvidia.cuda_nvrtc")
     with pytest.raises(NotImplementedError, match=r"NVRTC does not compile.*error"):
-        _cuda.ptx("nothing", "compute_90")
+        _cuda.kernel("nothing", 90)
 
 
 def test_refused_by_name(monkeypatch):

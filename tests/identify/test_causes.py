@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from benchmarks.warnings import ARTEFACTS, Outcome, outcome
+from jaxdamp import bench, dampers, identify
+from jaxdamp.parameters import parameters
 
 
 def first_cause(artefact: str, seed: int) -> tuple[str, Outcome]:
@@ -21,6 +23,34 @@ def test_a_spring_in_series_with_friction_is_no_delay_of_the_channel():
     """A law that differs in lag over records and directions; once read as a delay of 6.3 ms, with coverage 0 %."""
     cause, said = first_cause("spring and Dahl", 0)
     assert cause == "the law" and not any('add "' in text for text in said.texts), said.texts
+
+
+def test_a_spring_in_series_is_no_filter_beside_a_mass():
+    """Both explain 99 % here; following the advice once lowered the coverage from 50 to 25 %."""
+    cause, said = first_cause("series spring", 14)
+    assert cause == "the law" and not any('add "' in text for text in said.texts), said.texts
+
+
+def test_a_law_with_memory_is_not_told_to_become_one_without():
+    """Its residual has the shape of a curve; a table without hysteresis was proposed, worse on measured records."""
+    tests = [bench.SineTest(a, f, cycles=8) for a, f in ((0.02, 1.0), (0.01, 4.0))]
+    truth = dampers.SeriesSpring(dampers.Besinger(1600.0, 4200.0, 900.0, 0.13, 0.05), 1e6)
+    runs = bench.VirtualDyno(truth, 500.0, force_noise=5.0).run(tests)
+    (said,) = (
+        w
+        for w in identify.fit(dampers.SeriesSpring(dampers.Bilinear(2000.0, 1500.0), 1e6), runs).main_warnings
+        if "law misses the shape" in w
+    )
+    assert "take a law" not in said and "Compare laws" in said
+
+
+def test_a_filter_of_a_valve_that_opens_between_samples_is_followed():
+    """Once the filter ran in straight lines between samples, and the numbers of the law were up to 0.6 % off."""
+    law, tests = dampers.Besinger(1400.0, 5100.0, 810.0, 0.144, 0.044), [bench.SineTest(0.01, 8.0, cycles=10)]
+    runs = bench.VirtualDyno(law, 500.0, force_lag=4e-3, force_noise=1e-3).run([*tests, bench.SineTest(0.02, 1.0)])
+    result = identify.fit(law, runs, rig="lag")
+    numbers = {f"law.{p.path}": float(p.value) for p in parameters(law)} | {"rig.force_lag": 4e-3}
+    assert {e.name: e.value for e in result.parameters} == pytest.approx(numbers, rel=1e-3)
 
 
 def test_a_clock_that_jitters_is_no_clearance():

@@ -18,7 +18,8 @@ from jaxdamp.identify.traces import Batch
 TRUTH = LuGre.guess(np.array([-0.3, 0.0, 0.3]), np.array([-600.0, 100.0, 900.0])) + Linear(1500.0) + Spring(2000.0)
 TESTS = [SineTest(0.01, 2.0, cycles=2), SineTest(0.02, 2.0, cycles=2), SineTest(0.02, 4.0, cycles=3)]
 PLAIN = ("piecewise_linear", "besinger_lag", "besinger_series_spring", "table")
-LAWS = [pytest.param(n, marks=() if n in PLAIN else pytest.mark.slow) for n in identify.LAWS]
+THINNED = "thinned_visco_plastic"
+LAWS = [pytest.param(n, marks=() if n in PLAIN else pytest.mark.slow) for n in (*identify.LAWS, THINNED)]
 
 
 @pytest.fixture(scope="module")

@@ -114,7 +114,7 @@ def test_every_law_of_the_ladder_has_a_line_that_says_whether_it_has_hysteresis(
     run = _runs(Linear(2000.0), 5.0)[0]
     starts = identify.default_ladder([run])
     rows = {row["law"]: row for row in identify.laws_table().records()}
-    assert list(rows) == list(identify.NAMED_LAWS) == [*starts, "neural_hysteresis_spring"]
+    assert list(rows) == list(identify.NAMED_LAWS) == [*starts, "thinned_visco_plastic", "neural_hysteresis_spring"]
     for name, start in starts.items():
         assert isinstance(start, AbstractDamper)
         assert rows[name]["hysteresis"] == ("yes" if start.initial_state().size else "no")

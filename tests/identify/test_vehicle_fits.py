@@ -252,6 +252,24 @@ def test_a_reversed_channel_is_named(record, reversed_channel):
     )
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [10.0, 1.0 / 9.80665])
+def test_a_channel_in_another_unit_is_named(record, size):
+    channels = dict(record.channels) | {"sprung_acceleration": size * record["sprung_acceleration"]}
+    wrong = dataclasses.replace(record, channels=channels)
+    how = {"over": FREE, "freeze": ["sprung_mass"], "dt": 2e-3}
+    told = identify.fit(START, wrong, sensors=ZERO, **how).warnings
+    (named,) = (
+        float(found[1]) for text in told if (found := re.match(r"sprung_acceleration of sweep is (\S+) times", text))
+    )
+    assert named == pytest.approx(size, rel=0.4)
+    assert not any("stroke of sweep is" in text or "has a gain" in text for text in told)
+    gain = ZERO | {"sprung_acceleration": Sensor(gain=1.0)}
+    assert not any(
+        "times what the vehicle" in text for text in identify.fit(START, wrong, sensors=gain, **how).warnings
+    )
+
+
 def test_numbers_of_sensors_need_no_tangents_through_the_vehicle(record):
     """The columns of sensors are derivatives of what the simulation gave, and those of the vehicle do not change."""
     sensors = {"stroke": Sensor(offset=1e-3, gain=1.1), "sprung_acceleration": Sensor(offset=0.1, lag=2e-3)}

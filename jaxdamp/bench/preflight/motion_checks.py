@@ -18,11 +18,13 @@ _USUAL = (
     ("frequency", "Hz", 1e-3, 200.0, "Is time in ms or in minutes?"),
     ("largest force", "N", 1.0, 2e5, "Is the force in kN, or stroke and force exchanged?"),
     ("ratio of force and velocity", "N s/m", 20.0, 1e6, "Is one of the units of time, stroke and force another one?"),
+    ("acceleration", "m/s²", 1e-6, 1500.0, "Is time in minutes or in ms, or the stroke in m or mm?"),
 )
 _POWERS = {  # by which each of them grows with the numbers of a channel
-    "time": (-1, -1, 0, -1, 0, 1),
-    "stroke": (0, 1, 1, 0, 0, -1),
-    "force": (0, 0, 0, 0, 1, 1),
+    "time": (-1, -1, 0, -1, 0, 1, -2),
+    "stroke": (0, 1, 1, 0, 0, -1, 1),
+    "velocity": (0, 1, 1, 0, 0, -1, 1),  # from which the stroke is integrated
+    "force": (0, 0, 0, 0, 1, 1, 0),
 }
 _MISTAKEN = (  # the unit of the numbers, the one they were taken for, and how many times too large they are then
     ("time", "ms", "s", 1e3),
@@ -33,8 +35,16 @@ _MISTAKEN = (  # the unit of the numbers, the one they were taken for, and how m
     ("stroke", "um", "m", 1e6),
     ("force", "N", "kN", 1e3),
     ("force", "kN", "N", 1e-3),
+    ("time", "us", "ms", 1e3),
+    ("time", "min", "s", 1 / 60),
+    ("time", "s", "min", 60.0),
+    ("time", "ms", "min", 6e4),
+    ("stroke", "um", "mm", 1e3),
+    ("velocity", "mm/s", "m/s", 1e3),
+    ("velocity", "m/s", "mm/s", 1e-3),
 )
-_CLEARLY = 2.0  # times beyond what is usual, the factors of all six multiplied, from which one unit is said to be wrong
+_SECONDS = {"s": 1.0, "min": 60.0}  # units in which no bench counts by one
+_CLEARLY = 2.0  # times beyond what is usual, the factors of all multiplied, from which one unit is said to be wrong
 _IMPOSSIBLE = 10.0  # times the usual upper end of these two, from which a unit is wrong
 _BOUNDED = ("peak velocity", "amplitude")
 
@@ -122,8 +132,10 @@ def _magnitudes(e: Examined) -> Float[np.ndarray, " magnitudes"]:
     """The numbers of a record in the order of `_USUAL`; a hundredth of the forces at each end may be spikes."""
     run = e.run
     force = np.clip(run.force, *np.quantile(run.force, (0.01, 0.99)))
-    largest, ratio = float(np.max(np.abs(force))), float(np.std(force) / np.std(run.velocity))
-    return np.array([run.sampling_rate, run.peak_velocity, run.amplitude, run.frequency, largest, ratio])
+    speed, largest = float(np.std(run.velocity)), float(np.max(np.abs(force)))
+    acceleration = np.sqrt(2.0) * speed**2 / float(np.std(run.stroke))  # exact for a sine
+    motion = run.sampling_rate, run.peak_velocity, run.amplitude, run.frequency
+    return np.array([*motion, largest, float(np.std(force)) / speed, acceleration])
 
 
 def _times_beyond(values: Float[np.ndarray, " magnitudes"]) -> Float[np.ndarray, " magnitudes"]:
@@ -137,6 +149,10 @@ def _mistaken_unit(
 ) -> list[Finding]:
     """The channel whose numbers in another unit make all magnitudes usual, if there is one."""
     for channel, true, taken, factor in _MISTAKEN:
+        stated = e.run.units.get(channel, "" if e.run.units else taken)
+        of_rate = channel == "time" and not stated
+        if stated != taken and not of_rate:
+            continue
         if np.all(_times_beyond(values / factor ** np.array(_POWERS[channel], float)) == 1.0):
             odd = [
                 f"{what} {value:.3g} {unit}"
@@ -145,10 +161,25 @@ def _mistaken_unit(
             ]
             worst = int(np.argmax(beyond))
             size = f"{factor:.0f} times too large" if factor > 1.0 else f"{1 / factor:.0f} times too small"
-            message = f"the {channel} looks {size}, {true} taken for {taken}: {', '.join(odd)}"
-            remedy = f'If it is {true}, read the file with `units={{"{channel}": "{true}"}}`.'
-            return e.finding("error", f"unit of {channel}", message, values[worst], _USUAL[worst][1], None, remedy)
+            message = f"the {channel} looks {size}{'' if of_rate else f', {true} taken for {taken}'}: {', '.join(odd)}"
+            unit, remedy = _USUAL[worst][1], _unit_remedy(e, channel, true, of_rate)
+            return e.finding("error", f"unit of {channel}", message, values[worst], unit, None, remedy)
     return []
+
+
+def _unit_remedy(e: Examined, channel: str, true: str, of_rate: bool) -> str:
+    """How to read the file again; a time that goes on by one may count the samples instead."""
+    if of_rate:
+        return "State the rate of the file in Hz, `sampling_rate=...`."
+    counts = (
+        channel == "time" and abs(e.run.sampling_rate * _SECONDS.get(e.run.units.get("time", ""), 0.0) - 1.0) < 1e-9
+    )
+    remedy = f'If it is {true}, read the file with `units={{"{channel}": "{true}"}}`'
+    return (
+        f'{remedy}; if it counts samples, with `columns={{"time": None}}` and `sampling_rate=...`.'
+        if counts
+        else f"{remedy}."
+    )
 
 
 def jitter(e: Examined) -> list[Finding]:

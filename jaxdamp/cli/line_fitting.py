@@ -1,0 +1,114 @@
+"""`jaxdamp fit --each`: one law fitted to every damper of a production line, and control charts of its numbers."""
+
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from jaxdamp import _checks, bench, identify
+from jaxdamp._checks import ArgumentError
+from jaxdamp.bench import DamperRecords
+from jaxdamp.cli.console import Screen
+from jaxdamp.cli.jobs import Output, job, write_tables
+from jaxdamp.cli.limits import bounds_in_si
+from jaxdamp.cli.records import Reading, law_names
+from jaxdamp.cli.table_fitting import Refused
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.identify import ControlCharts, ManyFits
+from jaxdamp.report import result_report
+from jaxdamp.rig import Rig
+
+
+_TAKEN = ("freeze", "bounds", "tie", "weighting", "loss", "priors", "initial_state", "samples_per_cycle", "starts")
+_TAKEN += ("max_steps",)  # of the options of a fit
+
+
+def fit_line(
+    screen: Screen,
+    files: Sequence[Path],
+    each: str,
+    law: Sequence[str],
+    rig: Sequence[str],
+    reading: Reading,
+    options: Mapping[str, object],
+    output: Output,
+    *,
+    in_control: int | None,
+    refused: Sequence[Refused],
+) -> None:
+    """Fit one law to every damper of a line that is new since the last call, and chart its numbers.
+
+    Arguments:
+        screen: the terminal.
+        files: a folder tree, or a table of files.
+        each: what is a damper, as in `bench.read_dampers`.
+        law: name of the law.
+        rig: what the test machine adds.
+        reading: how the records are read and processed.
+        options: of the fits.
+        output: the folder to write; the fits are kept beside it, in a store of its name.
+        in_control: so many dampers at the beginning give the limits of control charts; None for no charts.
+        refused: options that say nothing of a line.
+    """
+    name = _checked(files, law, [*refused, *(Refused(n, True) for n in options if n not in _TAKEN)])
+    dampers = bench.read_dampers(files[0], each=each, **reading.read.arguments()).process(**reading.processing())
+    if in_control is not None:
+        _charts({"place": range(len(dampers))}, in_control)  # refuses too few or too many before anything is fitted
+    out = output.out or Path("jaxdamp-fit")
+    with job(screen, "fit", output) as work:
+        with screen.stage("Reading the first damper"):
+            start = _start(dampers, name, rig)
+        bounds = options.get("bounds")
+        stated = bounds_in_si(bounds if isinstance(bounds, dict) else {}, [{"law": start, "rig": Rig()}])
+        how = {**options, "bounds": stated, "rig": rig}
+        skips = "leave_out" if reading.read.given.get("skip_bad") else "refuse"
+        how["bad_records"] = "keep" if reading.keep_bad else skips
+        title = f"Fitting {name} to {len(dampers)} dampers"
+        with screen.stage(title) as advance, warnings.catch_warnings(action="ignore"):  # of dampers, which are remarks
+            how["progress"] = lambda done, total: advance(f"{done} of {total}", done)
+            fitting: Callable[..., ManyFits] = identify.fit_many
+            many = fitting(start, dampers, file=out.with_name(f"{out.name}.zarr"), **how)
+        results = [many] if in_control is None else [many, _charts(many, in_control)]
+        screen.answer(*(f"{result.summary}." for result in results))
+        screen.remarks([text for result in results for text in result.warnings], style="yellow")
+        screen.details(many.table())
+        with work.saving("Tables") as draft:
+            more = results[-1].tables() if in_control is not None else {}
+            write_tables(draft / "tables", {"fits": many.table(), **more})
+        work.page(result_report, results[-1])
+
+
+def _checked(files: Sequence[Path], law: Sequence[str], refused: Sequence[Refused]) -> str:
+    """The name of the law; what a line does not take is refused."""
+    for option in refused:
+        if option.given:
+            _checks.refuse(option.name, "be left out where each damper is fitted", "given", "Leave out one of them.")
+    names = law_names(law)
+    if len(names) != 1:
+        _checks.refuse("law", "be one law for all dampers", ", ".join(names) or "left out", 'See "jaxdamp laws".')
+    if len(files) != 1:
+        _checks.refuse("each", "be given with one folder or one table of files", f"given with {len(files)}")
+    return names[0]
+
+
+def _charts(numbers: ManyFits | Mapping[str, Sequence[float]], in_control: int) -> ControlCharts:
+    """The control charts of a line, whose limits come from so many dampers."""
+    try:
+        return identify.control_charts(numbers, baseline=in_control)
+    except ArgumentError as error:  # --baseline is another law
+        raise ArgumentError(str(error).replace("`baseline`", "`in_control`"), argument="in_control") from error
+
+
+def _start(dampers: DamperRecords, name: str, rig: Sequence[str]) -> AbstractDamper:
+    """The law of a name as the first damper whose records can be read gives it."""
+    why = ""
+    for damper in dampers:
+        try:
+            runs = dampers[damper]
+        except (ValueError, OSError) as error:
+            why = why or f"{damper}: {error}"
+            continue
+        law = identify.default_ladder(runs, [name], rig=rig)[name]
+        if not isinstance(law, AbstractDamper):
+            _checks.refuse("law", f"be one that starts from the records of {damper}", name, 'See "jaxdamp laws".')
+        return law
+    raise ValueError(f"No damper has records that can be read. {why}")
