@@ -172,7 +172,7 @@ def damper(panels: Sequence[Axes], shown: _rides.Rides, path: str) -> None:
             shares.step(0.5 * (edges[1:] + edges[:-1]), share, where="mid", **style)
     _thousandths(*panels)
     title = _style.first_upper(_style.in_words(path).removesuffix(" law"))
-    _style.dress(curves, "", "force [N]", title + ", at all levels of its command" * several, turns=True)
+    _style.dress(curves, "", "force [N]", title + ", at all levels of its command" * several, turns="y")
     _style.cross(curves)
     _style.dress(shares, "velocity [mm/s]   (+ rebound)", "time [%]", _rides.quadrants(velocities[1]))
     curves.set_xlim(-reach, reach)

@@ -192,15 +192,16 @@ def label_ends(
         axes.annotate(str(line.get_label()), to, xycoords="axes fraction", **look)
 
 
-def dress(axes: Axes, x: str, y: str, title: str = "", *, turns: bool = False) -> None:
+def dress(axes: Axes, x: str, y: str, title: str = "", *, turns: Literal["", "y", "xy"] = "") -> None:
     """Labels, a light grid, and no frame above and to the right; ticks in the units and the sign that are shown.
 
     The numbers drawn are those of the library: where the labels name a unit that is shown otherwise, the ticks are
-    round numbers of the other unit, and an axis of the other sign (an ordinate that `turns`) runs the other way.
+    round numbers of the other unit, and an axis of the other sign runs the other way: one whose label has the sign, or
+    that is among those that `turns` names.
     """
     for text in (axes.set_xlabel(display().text(x)), axes.set_ylabel(display().text(y))):
         _wrap(text, axes)
-    for axis, label, turn in ((axes.xaxis, x, False), (axes.yaxis, y, turns)):
+    for axis, label, turn in ((axes.xaxis, x, "x" in turns), (axes.yaxis, y, "y" in turns)):
         _rescale(axis, label, turn)
     if title:
         _wrap(axes.set_title(display().words(title), loc="left", fontsize="medium"), axes)

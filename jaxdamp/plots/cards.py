@@ -96,7 +96,7 @@ def law_card(
     left_out = int(np.count_nonzero(sizes)) - len(drawn)
     more = f", {left_out} more" if left_out else ""
     _style.dress(over_velocity, _style.VELOCITY, _style.FORCE)
-    _style.dress(over_stroke, _style.STROKE, "force [N]", turns=True)
+    _style.dress(over_stroke, _style.STROKE, "force [N]", turns="y")
     _style.dress(effects, f"velocity [m/s]   (+ rebound), {frequencies[fastest]:g} Hz", "effect p ∂F/∂p [N]")
     reach = float(np.max(np.abs(loops.velocity)))
     points = np.linspace(-reach, reach, 2001)

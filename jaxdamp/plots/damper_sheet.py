@@ -145,7 +145,7 @@ def _facts(damper: _Damper) -> str:
     facts += [f"settings {', '.join(settings)}"] * (len(settings) > 1)
     temperatures = [float(run.temperature.mean()) for run in runs if run.temperature is not None]
     facts += [f"{np.mean(temperatures) - 273.15:.0f} °C"] if temperatures else []
-    return " · ".join([*facts, "+ rebound"])
+    return " · ".join([*facts, display().text("+ rebound")])
 
 
 def _force_velocity(
@@ -169,7 +169,7 @@ def _force_velocity(
         axes.fill_between(_MM * np.asarray(band.velocity), band.lower, band.upper, **ends)
     if limits is not None:
         _tolerances(axes, limits, damper.static_force)
-    _style.dress(axes, "velocity [mm/s]", "force [N]", _force_title(damper))
+    _style.dress(axes, "velocity [mm/s]", "force [N]", _force_title(damper), turns="xy")
     _style.cross(axes)
     axes.set_xlim(-1.05 * reach, 1.05 * reach)
     if len(damper.evaluation.settings) > 1:
@@ -230,7 +230,8 @@ def _tolerances(axes: Axes, limits: LimitCheck, static: float) -> None:
 
 def _forces(axes: Axes, damper: _Damper) -> None:
     """Rebound and compression at stated velocities: of the law where there is one, otherwise measured."""
-    newton, speed = display().of("N"), display().of("mm/s")
+    both = not damper.laws and len(damper.evaluation.settings) > 1  # sides below one another
+    newton, speed = display().of("N", signed=True), display().of("mm/s", signed=both)
     if damper.laws:
         reach = _MM * max(run.peak_velocity for run in damper.runs)
         usual = np.array(VELOCITIES) * (1.016 if speed.unit == "in/s" else 1.0)  # round numbers of either
@@ -280,9 +281,8 @@ def _loops(axes: Axes, damper: _Damper) -> None:
             axes.plot(stroke, expected, color=colour, linewidth=1.0)
     fastest, slowest = (_style.short(_MM * shown[i].peak_velocity) for i in (-1, 0))
     speeds = f"{slowest} mm/s (dark) to {fastest} mm/s" if len(shown) > 1 else f"{fastest} mm/s"
-    _style.dress(
-        axes, "stroke [mm]", "force [N]", f"Loops, {speeds}" + ("\nbroad: measured, thin: law" if fitted else "")
-    )
+    title = f"Loops, {speeds}" + ("\nbroad: measured, thin: law" if fitted else "")
+    _style.dress(axes, "stroke [mm]", "force [N]", title, turns="xy")
     _style.cross(axes)
 
 
@@ -319,7 +319,7 @@ def _gas_and_friction(axes: Axes, damper: _Damper) -> None:
         _sheet.remarks(axes, "Gas force and friction: not measured", [note], width=36)
         return
     both_directions(axes, separated)
-    _style.dress(axes, "stroke [mm]", "force [N]", gas_and_friction_words(separated, ",\n"))
+    _style.dress(axes, "stroke [mm]", "force [N]", gas_and_friction_words(separated, ",\n"), turns="xy")
 
 
 def _parameters(axes: Axes, damper: _Damper) -> None:

@@ -1,13 +1,14 @@
 """Records without a law: as they are, mean loops, forces over velocity with limits and a baseline, gas and friction."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp._display import rounded
+from jaxdamp._display import display, rounded
 from jaxdamp._types import Axes, Figure
 from jaxdamp.bench import (
     BenchRun,
@@ -142,8 +143,10 @@ def both_directions(axes: Axes, found: GasAndFriction) -> None:
 
 
 def gas_and_friction_words(found: GasAndFriction, between: str = ", ") -> str:
-    """Static force at mid-stroke, its rate and the friction, with their uncertainties."""
+    """Static force at mid-stroke in the sign that is shown, its rate and the friction, with their uncertainties."""
     values = {m.quantity: m for m in found.measurements}
+    if display().of("", signed=True).factor < 0.0:
+        values["gas force"] = replace(values["gas force"], value=-values["gas force"].value)
     gas, friction = (_with_uncertainty(values[name]) for name in ("gas force", "friction"))
     return f"Static {gas} N, {_style.short(1e-3 * found.gas_rate)} N/mm{between}friction {friction} N"
 

@@ -65,9 +65,9 @@ def fit_loops(result: FitResult, runs: BenchRun | Sequence[BenchRun] | None = No
     label = "fitted − measured [N]"
     _style.dress(loops, _style.VELOCITY, _style.FORCE, "Force over velocity")
     _style.dress(football, _style.STROKE, _style.FORCE, "Force over stroke")
-    _style.dress(over_velocity, _style.VELOCITY, label, "Residual over velocity", turns=True)
+    _style.dress(over_velocity, _style.VELOCITY, label, "Residual over velocity", turns="y")
     over_cycle = "Residual over the cycle, means of 1/40"
-    _style.dress(over_time, "time in the cycle, over its period [–]", label, over_cycle, turns=True)
+    _style.dress(over_time, "time in the cycle, over its period [–]", label, over_cycle, turns="y")
     for axes in (loops, football, over_velocity):
         _style.cross(axes)
         _style.few_ticks(axes, 7)
@@ -115,7 +115,7 @@ def loops_by_law(comparison: Comparison, record: str | None = None) -> Figure:
         axes.plot(run.velocity[part], force[part], label="law", **_style.AFTER)
         best = ", recommended" * (rung is comparison.best)
         words = f"{_style.in_words(rung.name)}: {_style.short(rung.error)}\N{NO-BREAK SPACE}N{best}"
-        _style.dress(axes, _style.VELOCITY, "force [N]", words, turns=True)
+        _style.dress(axes, _style.VELOCITY, "force [N]", words, turns="y")
         _style.cross(axes)
         _style.few_ticks(axes, 4)
         axes.label_outer()

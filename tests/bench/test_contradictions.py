@@ -62,6 +62,8 @@ def test_records_of_one_name_are_named_once():
     (sentence,) = contradictions_in_words(contradictions(runs))
     assert ": two records 20mm_2Hz by 17" in sentence
     assert preflight(runs).named("contradiction")[0].record == "20mm_2Hz"
+    apart = [replace(run, settings={"clicks": number}) for number, run in enumerate(runs)]
+    assert not preflight(apart).named("contradiction")  # what was set explains it
 
 
 def test_a_gas_force_contradicts_too():

@@ -36,6 +36,12 @@ def test_pictures_in_the_units_and_the_sign_of_a_shop(comparison: Comparison) ->
     assert all(axes.xaxis_inverted() and axes.yaxis_inverted() for axes in (panel, *loops.axes[:3]))
     assert all(f"{step:.4e}"[:6] in ("1.0000", "2.0000", "2.5000", "4.0000", "5.0000") for step in steps), steps
     said = [panel.get_title(loc="left"), loops.get_suptitle(), *(t.get_text() for t in sheet.findobj(Text))]
+    panels = [axes for axes in sheet.axes if axes.get_ylabel().startswith("force")]
+    assert len(panels) > 1 and all(axes.xaxis_inverted() and axes.yaxis_inverted() for axes in panels)
+    assert any(text.endswith("+ compression") for text in said)
+    table = next(axes for axes in sheet.axes if any("Forces of the law" in t.get_text() for t in axes.texts))
+    cells = [t.get_text() for t in table.texts]
+    assert cells[5].startswith("−") and not cells[6].startswith("−")  # in rebound and in compression
     assert sum("lbf" in text for text in said) > 6
     assert not [text for text in said if re.search(r"\[N\]|\d\s+k?N\b|N s/m|mm/s", text)]
 

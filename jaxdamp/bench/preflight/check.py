@@ -235,9 +235,12 @@ def _first_error(run: BenchRun, robust: bool) -> Finding | None:
 
 
 def mixed_settings(runs: Sequence[BenchRun]) -> list[Finding]:
-    """Records of one command, or of none, with the same motion but another force."""
+    """Records of one command and one setting, or of none, with the same motion but another force."""
     findings = []
-    for pair in contradictions(runs, same_command=True):
+    groups: dict[str, list[BenchRun]] = {}
+    for run in runs:
+        groups.setdefault(str(sorted(run.settings.items())), []).append(run)
+    for pair in (pair for group in groups.values() for pair in contradictions(group, same_command=True)):
         message = (
             f"the same motion, but forces differ by {pair.difference:.3g} N, {100 * pair.share:.0f} % of their RMS"
         )
