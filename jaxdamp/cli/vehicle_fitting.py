@@ -68,8 +68,10 @@ def fit_vehicle(
         guided, call = fit_arguments(car, rides, benches, how, guide)
         comparison = _compared(screen, guided, forms, rides, call) if forms else None
         result = comparison.best.result if comparison else _fitted(screen, guided, rides, call)
-        for table in (result.scores_table(), result.table()):
-            screen.table(table)
+        if not comparison:
+            screen.answer(f"{result.summary}.")
+        screen.table(result.table())
+        screen.details(result.scores_table())
         screen.points([result.patterns] * bool(result.patterns))
         screen.remarks(result.warnings, style="yellow")
         with work.saving("Vehicle and tables") as draft:

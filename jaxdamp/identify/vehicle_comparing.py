@@ -94,7 +94,9 @@ class VehicleRung(NamedTuple):
         """The error of each channel of each drive, or part of a drive, that was left out."""
         columns = (Column("left out"), Column("channel"), Column("unit"), Column("RMSE", spec=".3g"))
         columns += (Column("fit", "%", ".1f"), Column("largest error", spec=".3g"))
-        return Table(f"Errors of {self.name}: {self.judged_on}", columns, tuple(tuple(s)[:-1] for s in self.scores))
+        return Table(
+            f"Errors of {self.name}: {self.judged_on}", columns, tuple(tuple(s)[: len(columns)] for s in self.scores)
+        )
 
 
 @dataclasses.dataclass(frozen=True, repr=False)

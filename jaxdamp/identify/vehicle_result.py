@@ -74,7 +74,8 @@ class VehicleFit(Fit):
     @property
     def summary(self) -> str:
         """Vehicle, number of records, and the channel that is predicted worst."""
-        return f"{type(self.vehicle).__name__} on {len(self.records)} record(s): {self.worst}"
+        drives = f"{len(self.records)} drive{'s' * (len(self.records) > 1)}"
+        return f"{type(self.vehicle).__name__} fitted to {drives}: {self.worst}"
 
     @property
     def worst(self) -> str:
@@ -162,7 +163,7 @@ class VehicleFit(Fit):
         """The errors of each channel of each record."""
         columns = [Column("record"), Column("channel"), Column("unit"), Column("RMSE", spec=".3g")]
         columns += [Column("fit", "%", ".1f"), Column("largest error", spec=".3g")]
-        return Table("Channels", tuple(columns), tuple(tuple(score)[:-2] for score in self.scores))
+        return Table("Channels", tuple(columns), tuple(tuple(score)[: len(columns)] for score in self.scores))
 
     def parameters_table(self) -> Table:
         """`table()`."""

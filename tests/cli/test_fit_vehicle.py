@@ -78,6 +78,7 @@ def test_a_file_of_another_lab_gives_the_vehicle(fitted: tuple[Path, str]) -> No
         1.5e-3, abs=4 * float(offset["standard error"])
     )
     assert json.loads((out / "fit.json").read_text())["converged"] is True
+    assert "QuarterCar fitted to 1 drive: the least fit is " in " ".join(text.split())
     assert "standard error" in text and "could not be made" not in text
     assert {file.name for file in out.iterdir()} == {
         "vehicle.json", "law.json", "parameters.csv", "channels.csv", "lab_fitted.csv", "fit.json", "channels.png",
@@ -130,7 +131,7 @@ def test_bench_records_guides_and_two_records_in_one_fit(files: dict[str, Path],
         out,
     ]
     records = [tmp_path / f"{name}.csv" for name in names]
-    text = jaxdamp("fit-vehicle", files["car.toml"], *records, *words).output
+    text = jaxdamp("fit-vehicle", files["car.toml"], *records, *words, "--verbose").output
     found = {r["parameter"]: r for r in csv.DictReader((out / "parameters.csv").read_text().splitlines())}
     true = {"vehicle.car.sprung_mass": 300.0, "vehicle.guides.0.law.friction_force": 40.0, "rig.gas_force": -80.0}
     for name, value in true.items():
