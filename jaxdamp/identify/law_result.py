@@ -56,8 +56,8 @@ class AbstractFitted(AbstractResult):
     @property
     def summary(self) -> str:
         """Law, number of records and errors."""
-        percent = f"{self.fit_percent:.1f} %"
-        return f"{type(self.law).__name__} on {len(self.runs)} records: {percent}, RMSE {self.rmse:.4g} N"
+        percent, several = f"{self.fit_percent:.1f} %", "s" * (len(self.runs) > 1)
+        return f"{type(self.law).__name__} on {len(self.runs)} record{several}: {percent}, RMSE {self.rmse:.4g} N"
 
     @property
     def model(self) -> Model:

@@ -82,8 +82,9 @@ class Training(AbstractFitted):
     @property
     def summary(self) -> str:
         """Law, number of records, errors, and how the training ended."""
+        several = "s" * (len(self.runs) > 1)
         return (
-            f"{type(self.law).__name__} trained on {len(self.runs)} records: {self.fit_percent:.1f} %, RMSE "
+            f"{type(self.law).__name__} trained on {len(self.runs)} record{several}: {self.fit_percent:.1f} %, RMSE "
             f"{self.rmse:.4g} N; on {len(self.held_out)} held out: {self.held_out_fit_percent:.1f} %, RMSE "
             f"{self.held_out_rmse:.4g} N; best at step {self.best_step}, {self.stopped}"
         )
