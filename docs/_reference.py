@@ -54,7 +54,7 @@ def public_names() -> dict[str, str]:
 
 
 def write_pages(folder: Path, hysteresis: dict[str, str]) -> None:
-    """One page for each package and for each law, the types, and the page that lists all.
+    """One page for each package, class and function, the types, and the page that lists all.
 
     Arguments:
         folder: where the pages go.
@@ -64,7 +64,13 @@ def write_pages(folder: Path, hysteresis: dict[str, str]) -> None:
     names = packages()
     described: dict[int, str] = {}
     for name in [*names, "jaxdamp"]:
-        _write(folder / f"{name}.rst", _page(name, described, hysteresis if name == "jaxdamp.dampers" else {}))
+        page, members = _page(name, described, hysteresis if name == "jaxdamp.dampers" else {})
+        _write(folder / f"{name}.rst", page)
+        for member, text in members.items():
+            text = "\n".join(
+                [":orphan:", "", member, "=" * len(member), "", text]
+            )  # in no sidebar, which all pages have
+            _write(folder / f"{name}.{member}.rst", text)
     for law in hysteresis:
         _write(folder / f"jaxdamp.dampers.{law}.rst", _law_page(law))
     _write(folder / "laws.txt", _thumbnails(hysteresis))
@@ -75,18 +81,26 @@ def write_pages(folder: Path, hysteresis: dict[str, str]) -> None:
     _write(folder / "index.rst", "\n".join(["API reference", "=============", "", *summaries, *contents]))
 
 
-def _page(name: str, described: dict[int, str], laws: dict[str, str]) -> str:
+def _page(name: str, described: dict[int, str], laws: dict[str, str]) -> tuple[str, dict[str, str]]:
+    """The page of a package, and what stands on those of its classes and functions."""
     package = import_module(name)
     lines = [name, "=" * len(name), "", f".. automodule:: {name}", "", f".. currentmodule:: {name}", ""]
     if laws:
         lines += [*_gallery(laws), "All names", "-" * 9, ""]
-    lines += _list(name, package.__all__, described, laws)
-    shared = shared_names(package)
-    lines += _members(name, sorted(set(package.__all__) - set(laws)), described)
-    if shared:
-        lines += ["Results and further parts", "-" * 25, "", FURTHER, ""]
-        lines += [*_list(name, shared, described, laws), *_members(name, shared, described)]
-    return "\n".join(lines)
+    shared, pages = shared_names(package), {}
+    for members in (package.__all__, shared):
+        if members is shared and shared:
+            lines += ["Results and further parts", "-" * 25, "", FURTHER, ""]
+        lines += _list(name, list(members), described, laws)
+        for member in sorted(set(members) - set(laws)):
+            value = getattr(package, member)
+            own = _is_own(value) and id(value) not in described
+            text = _member(f"{name}.{member}", value, described)
+            if own:
+                pages[member] = text
+            else:
+                lines.append(text)
+    return "\n".join(lines), pages
 
 
 def _list(name: str, members: list[str], described: dict[int, str], laws: dict[str, str]) -> list[str]:
@@ -154,11 +168,6 @@ def _types(names: Names) -> list[str]:
         else:  # for type checkers only
             short += [*place, f".. py:type:: {word}", "", f"   {ast.get_docstring(value)}", ""]
     return [*short, *classes]
-
-
-def _members(name: str, members: list[str], described: dict[int, str]) -> list[str]:
-    package = import_module(name)
-    return [_member(f"{name}.{member}", getattr(package, member), described) for member in sorted(members)]
 
 
 def _is_own(value: Any) -> bool:

@@ -246,7 +246,8 @@ def few_ticks(axes: Axes, most: int) -> None:
     """
     from matplotlib.ticker import MaxNLocator
 
-    before: Any = axes.xaxis.get_major_locator()  # of a linear axis
+    before = axes.xaxis.get_major_locator()
+    assert isinstance(before, MaxNLocator)  # of a linear axis
     before.set_params(steps=[1, 2, 2.5, 4, 5, 10])
 
     class Ticks(MaxNLocator):

@@ -169,7 +169,7 @@ def test_limits_that_other_roads_break_are_tightened():
 
 def moved_limit(result: Any) -> float:
     """The one number that a relaxation proposes."""
-    (text,) = re.findall(r"[<>]= ([0-9.e+-]+)", result.relaxation)
+    (text,) = re.findall(r"[≤≥] ([0-9.e+-]+)", result.relaxation)
     return float(text)
 
 
