@@ -67,10 +67,8 @@ def write_pages(folder: Path, hysteresis: dict[str, str]) -> None:
         page, members = _page(name, described, hysteresis if name == "jaxdamp.dampers" else {})
         _write(folder / f"{name}.rst", page)
         for member, text in members.items():
-            text = "\n".join(
-                [":orphan:", "", member, "=" * len(member), "", text]
-            )  # in no sidebar, which all pages have
-            _write(folder / f"{name}.{member}.rst", text)
+            head = [":orphan:", "", member, "=" * len(member), "", f"Of :doc:`{name}`.", ""]  # in no sidebar
+            _write(folder / f"{name}.{member}.rst", "\n".join([*head, text]))
     for law in hysteresis:
         _write(folder / f"jaxdamp.dampers.{law}.rst", _law_page(law))
     _write(folder / "laws.txt", _thumbnails(hysteresis))
