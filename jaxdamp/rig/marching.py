@@ -191,7 +191,7 @@ def _refine(values: Signal, steps: Signal, parts: int) -> Float[Array, " fine"]:
 
 def finer(
     dt: Array, stroke: Signal, velocity: Signal, followed: Followed, parts: int
-) -> tuple[Array, tuple[Signal, Signal], Followed]:
+) -> tuple[Array, tuple[Float[Array, " instants"], Float[Array, " instants"]], Followed]:
     """Step [s], motion and channels with so many instants for each: the motion by cubics, the channels straight.
 
     Arguments:

@@ -44,6 +44,7 @@ _MISTAKEN = (  # the unit of the numbers, the one they were taken for, and how m
     ("velocity", "m/s", "mm/s", 1e-3),
 )
 _SECONDS = {"s": 1.0, "min": 60.0}  # units in which no bench counts by one
+_SAMPLED = 50.0  # Hz, at which a record in minutes is sampled at the least
 _CLEARLY = 2.0  # times beyond what is usual, the factors of all multiplied, from which one unit is said to be wrong
 _IMPOSSIBLE = 10.0  # times the usual upper end of these two, from which a unit is wrong
 _BOUNDED = ("peak velocity", "amplitude")
@@ -153,7 +154,10 @@ def _mistaken_unit(
         of_rate = channel == "time" and not stated
         if stated != taken and not of_rate:
             continue
-        if np.all(_times_beyond(values / factor ** np.array(_POWERS[channel], float)) == 1.0):
+        corrected = values / factor ** np.array(_POWERS[channel], float)
+        if true == "min" and corrected[0] < _SAMPLED:
+            continue  # a stroke ten times too large looks alike
+        if np.all(_times_beyond(corrected) == 1.0):
             odd = [
                 f"{what} {value:.3g} {unit}"
                 for value, times, (what, unit, *_) in zip(values, beyond, _USUAL, strict=True)
