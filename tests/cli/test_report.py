@@ -34,7 +34,7 @@ def test_the_chain_is_on_one_page_with_its_files(tmp_path: Path) -> None:
     tuning = json.loads((out / "tuning.json").read_text())
     heading = Outcome[tuning["verdict"]].value  # the records are slower than the damper on this bump
     assert heading == "Not known to be better: outside the records" and "A better damper" not in page
-    assert all(text in page for text in ("Tuned law against vehicle as it is", "Fitted law against", heading))
+    assert all(text in page for text in ("tuned law against vehicle as it is", "fitted law against", heading))
     first, _, last = tuning["summary"].partition(". ")  # the verdict, and how the search ended
     assert said(first) in page and first_upper(said(last)) in page
     names = {file.name for file in out.iterdir()}
