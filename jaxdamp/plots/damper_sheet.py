@@ -280,7 +280,7 @@ def _loops(axes: Axes, damper: _Damper) -> None:
             expected = fitted[run.name][part] - static
             axes.plot(stroke, expected, color=colour, linewidth=1.0)
     fastest, slowest = (_style.short(_MM * shown[i].peak_velocity) for i in (-1, 0))
-    speeds = f"{slowest} mm/s (dark) to {fastest} mm/s" if len(shown) > 1 else f"{fastest} mm/s"
+    speeds = f"{slowest} to {fastest} mm/s (light)" if len(shown) > 1 else f"{fastest} mm/s"
     title = f"Loops, {speeds}" + ("\nbroad: measured, thin: law" if fitted else "")
     _style.dress(axes, "stroke [mm]", "force [N]", title, turns="xy")
     _style.cross(axes)
