@@ -204,7 +204,9 @@ def test_measured_records(data):
         assert len(found.named(name)) == 12, name
     assert all(f.size == pytest.approx(3.04, abs=0.01) for f in found.named("force quantised"))
     assert {f.record for f in found.named("static force against gas")} >= {run.name for run in runs if run.command == 0}
-    mixed = preflight([replace(run, command=None) for run in runs])
+    unstated = [replace(run, command=None) for run in runs]
+    assert not preflight(unstated).named("contradiction")  # their names state the current
+    mixed = preflight([replace(run, settings={}) for run in unstated])
     assert len(mixed.named("contradiction")) >= 8
 
 
