@@ -113,12 +113,10 @@ class AbstractDamper(Module):
         By default the combined traits of the laws inside, but without linearity in the parameters and without states
         that may be extrapolated, since these depend on the outer law.
         """
-        inside, constant = [law.traits() for law in self.inner_laws()], bool(self.constant_forces())
-        if not inside:
-            return Traits(contains_offset=constant)
-        both = combined_traits(inside)
-        constant |= both.contains_offset
-        return both._replace(extrapolable_states=False, linear_in_parameters=False, contains_offset=constant)
+        inside = [law.traits() for law in self.inner_laws()]
+        traits = combined_traits(inside) if inside else Traits()
+        offset = traits.contains_offset or bool(self.constant_forces())
+        return traits._replace(extrapolable_states=False, linear_in_parameters=False, contains_offset=offset)
 
     def at_temperature(self, temperature: ScalarLike) -> "AbstractDamper":
         """This law with its oil at a known temperature [K]; by default with the laws inside at this temperature.

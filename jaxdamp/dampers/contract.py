@@ -51,6 +51,11 @@ class Traits(NamedTuple):
     solves_equation: bool = False
     step_angle: float = 0.06
 
+    def scaled_along_stroke(self) -> "Traits":
+        """Those of the force times a factor of the stroke: at rest it changes with the stroke, even if constant."""
+        at_rest = self.stroke_dependent_at_rest or self.contains_offset
+        return self._replace(stroke_dependent=True, stroke_dependent_at_rest=at_rest)
+
 
 def combined_traits(traits: Iterable[Traits]) -> Traits:
     """The traits of a sum of laws."""

@@ -62,10 +62,8 @@ class Linkage(AbstractWrapper):
         return True
 
     def traits(self) -> Traits:
-        """Those of the law inside; a force that it has at rest changes with the stroke, even if it is constant."""
-        inner = super().traits()
-        at_rest = inner.stroke_dependent_at_rest or inner.contains_offset
-        return inner._replace(stroke_dependent=True, stroke_dependent_at_rest=at_rest)
+        """A factor of the stroke on the force."""
+        return super().traits().scaled_along_stroke()
 
     def _bends(self, x: ScalarLike | Array) -> tuple[Array, Array]:
         """Travel [m] beyond each point but the last, up to the next one smoothed off, and its slope."""

@@ -4,6 +4,7 @@ from typing import final
 
 import jax.numpy as jnp
 
+from jaxdamp._limits import within
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.contract import Traits
@@ -18,8 +19,9 @@ class StrokeScaled(AbstractWrapper):
 
     The gas pressure, which presses the seal to the rod, the clearance of a worn or tapered tube, the length of the gap
     of a magnetorheological piston change with the stroke. The factor is positive, so that a law that dissipates at
-    every instant still does; one at x = 0. It grows without limit, so the law holds within the strokes of its records.
-    `StrokeDependent` has a curve of its own for each stroke, of laws without states.
+    every instant still does; one at x = 0. It grows steeply, so the law holds within the strokes of its records; its
+    exponent is kept within ±60, so that the force is finite at any stroke. `StrokeDependent` has a curve of its own for
+    each stroke, of laws without states.
 
     Arguments:
         law: the force at x = 0.
@@ -42,18 +44,16 @@ class StrokeScaled(AbstractWrapper):
         return True
 
     def traits(self) -> Traits:
-        """Those of the law inside; a force that it has at rest changes with the stroke, even if it is constant."""
-        inner = super().traits()
-        at_rest = inner.stroke_dependent_at_rest or inner.contains_offset
-        return inner._replace(stroke_dependent=True, stroke_dependent_at_rest=at_rest)
+        """A factor of the stroke on the force."""
+        return super().traits().scaled_along_stroke()
 
     def motion_inside(self, motion: Motion) -> list[tuple[AbstractDamper, Motion]]:
         """The same motion; the force inside is not known."""
         return [(self.law, motion.with_force(None))]
 
     def factor(self, x: ScalarLike) -> Scalar:
-        """exp(a x + b x²)."""
-        return jnp.exp((self.slope + self.curvature * x) * x)
+        """exp(a x + b x²), from e⁻⁶⁰ to e⁶⁰."""
+        return jnp.exp(within((self.slope + self.curvature * x) * x, -60.0, 60.0))
 
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
         """Force [N]."""

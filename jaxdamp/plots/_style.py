@@ -199,28 +199,25 @@ def dress(axes: Axes, x: str, y: str, title: str = "", *, turns: Literal["", "y"
     round numbers of the other unit, and an axis of the other sign runs the other way: one whose label has the sign, or
     that is among those that `turns` names.
     """
-    for text in (axes.set_xlabel(display().text(x)), axes.set_ylabel(display().text(y))):
-        _wrap(text, axes)
-    for axis, label, turn in ((axes.xaxis, x, "x" in turns), (axes.yaxis, y, "y" in turns)):
-        _rescale(axis, label, turn)
+    for axis, name, label in ((axes.xaxis, "x", x), (axes.yaxis, "y", y)):
+        wrap(axis.set_label_text(display().text(label)), axes)
+        _rescale(axis, label, name in turns)
     if title:
-        _wrap(axes.set_title(display().words(title), loc="left", fontsize="medium"), axes)
+        wrap(axes.set_title(display().words(title), loc="left", fontsize="medium"), axes)
     axes.grid(True, color="0.9", linewidth=0.8)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def together(text: str) -> str:
-    """A sign in brackets stays with its word, (+ rebound), where a line is broken."""
-    return re.sub(r"(?<=\([+−]) ", "\N{NO-BREAK SPACE}", text)
-
-
 _SLACK = 0.35  # inch, by which a title or label may be longer than its axes
 
 
-def _wrap(text: "matplotlib.text.Text", axes: Axes) -> None:
-    """Break a title or label where it is longer than its axes, as wide as these are when they are drawn."""
-    text.set_text(together(text.get_text()))
+def wrap(text: "matplotlib.text.Text", axes: Axes) -> None:
+    """Break a title or label where it is longer than its axes, as wide as these are when they are drawn.
+
+    A sign in brackets stays with its word: (+ rebound).
+    """
+    text.set_text(re.sub(r"(?<=\([+−]) ", "\N{NO-BREAK SPACE}", text.get_text()))
     text.set_wrap(True)
     vars(text)["_get_wrap_line_width"] = functools.partial(_longest, text, axes)  # by default the width of the figure
 

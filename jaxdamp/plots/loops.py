@@ -122,7 +122,7 @@ def loops_by_law(comparison: Comparison, record: str | None = None) -> Figure:
     for axes in panels.flat[len(shown) :]:
         axes.set_axis_off()
     for axes in panels.flat[max(len(shown) - columns, 0) : len(shown)]:
-        axes.set_xlabel(_style.together(display().text(_style.VELOCITY)))
+        _style.wrap(axes.set_xlabel(display().text(_style.VELOCITY)), axes)
         axes.tick_params(labelbottom=True)
     judged = "on motion held out" if comparison.best.judged_on else "on the fitted records"
     few = f", the best {len(shown)} of {len(rungs)} laws" * (len(shown) < len(rungs))

@@ -7,8 +7,15 @@ class Film {
   static SHOWN = 0.25;  // m, of the largest motion in the picture
   static FACTORS = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
 
-  // Buttons and outputs {play, speed, time, now}; `drawn` is called after each picture.
-  constructor(controls, drawn = () => {}) {
+  static BAR = `<button type="button" id="filmPlay" aria-label="play or pause">Play</button>
+    <label>speed <select id="filmSpeed"><option value="1">as it is</option><option value="0.5">1/2</option>
+    <option value="0.2" selected>1/5</option><option value="0.1">1/10</option><option value="0.02">1/50</option></select></label>
+    <input type="range" id="filmTime" min="0" step="any" value="0" aria-label="time"> <output id="filmNow"></output>`;
+
+  // `bar` holds its buttons and outputs; `drawn` is called after each picture.
+  constructor(bar, drawn = () => {}) {
+    bar.innerHTML = Film.BAR;
+    const [play, speed, time, now] = ["Play", "Speed", "Time", "Now"].map((id) => document.getElementById("film" + id)), controls = { play, speed, time, now };
     Object.assign(this, { controls, drawn, time: 0, playing: false, last: null, designs: [], canvases: [] });
     controls.play.addEventListener("click", () => this.set(!this.playing));
     controls.time.addEventListener("input", (event) => this.set(false, Number(event.target.value)));

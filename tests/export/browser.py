@@ -160,3 +160,14 @@ def started():
             process.wait(PATIENCE)
             for end in (*to_browser, *from_browser):
                 os.close(end)
+
+
+def is_played_and_set(browser, time: str, shown: str) -> None:
+    """A film plays by itself, is stopped, and is set to a time, which it says."""
+    browser.wait("film.time > 0.02")
+    browser.click("#filmPlay")
+    stopped = browser.evaluate("film.time")
+    browser.settle()
+    assert browser.evaluate("film.time") == stopped
+    browser.choose("#filmTime", time)
+    assert browser.evaluate("film.controls.now.textContent") == shown

@@ -246,67 +246,6 @@ def test_the_saved_law_is_read_back_exactly(tmp_path, browser):
     assert not browser.troubles()
 
 
-def is_moving(browser, vehicle, road):
-    """The picture in motion has the heights and forces of the library."""
-    substeps = browser.evaluate("state.substeps")
-    response = simulate(vehicle, road, duration=DURATION, substeps=substeps)
-    shown = browser.evaluate("state.results.law.moving.map((values) => [...values])")
-    coordinates = len(vehicle.coordinates)
-    expected = np.asarray(response.motion)[::10, :coordinates].T
-    np.testing.assert_allclose(shown[:coordinates], expected, CLOSE, CLOSE * np.abs(expected).max())
-    forces = np.array([response[f"{name}_force"][::10] for name in response.dampers])
-    np.testing.assert_allclose(shown[coordinates:], forces, CLOSE, CLOSE * np.abs(forces).max())
-    upper = browser.evaluate("DATA.drawing.dampers[0].ends[0]")
-    point = browser.evaluate(f"DATA.drawing.points[{upper}]")
-    height = response["z_sprung"] + (point["ahead"] * response["pitch"] if "pitch" in response.units else 0.0)
-    drawn = browser.evaluate(f"[...film.designs[1].points[{upper}].height]")
-    np.testing.assert_allclose(drawn, 1e4 * np.asarray(height)[::10], 1e-6, 1e-6)
-    road_drawn = browser.evaluate("film.designs[1].wheels.map((wheel) => [...wheel.road])")
-    np.testing.assert_allclose(road_drawn, 1e4 * np.asarray(response.road)[::10].T, CLOSE, 1e-6)
-
-
-@pytest.mark.slow
-def test_a_half_car_of_two_axles_in_motion(tmp_path, browser):
-    car = presets.half_car_002
-    page(VALVE, tmp_path, browser, vehicle=car(VALVE))
-    road = iso8608("C", 20.0, DURATION, seed=0)
-    is_ride(cells(browser), car(VALVE), road, substeps=browser.evaluate("state.substeps"))
-    is_moving(browser, car(VALVE), road)
-    assert browser.evaluate("DATA.vehicle.fixed") == ["front distance", "rear distance"]
-    assert browser.evaluate("document.querySelector('[data-path=\"front_distance\"]')") is None
-    browser.choose("#roadKind", "bump")
-    browser.type('[data-path="rebound_rate"]', "1900")
-    changed = car(replace(VALVE, {"rebound_rate": 1900.0}))
-    is_moving(browser, changed, cosine_bump(0.06, start=1.0, length=5.0, speed=20.0))
-    assert not browser.troubles()
-
-
-@pytest.mark.slow
-def test_the_film_plays_and_is_set_to_a_time(tmp_path, browser):
-    file = page(VALVE, tmp_path, browser, baseline=Linear(1500.0), road=RUN_OVER)
-    browser.evaluate("get('filmLaw').scrollIntoView()")
-    browser.wait("film.time > 0.02")
-    browser.click("#filmPlay")
-    stopped = browser.evaluate("film.time")
-    browser.settle()
-    assert browser.evaluate("film.time") == stopped
-    browser.choose("#filmTime", "1.25")
-    assert browser.evaluate("get('filmNow').textContent") == "1.25 of 4.00 s"
-    pixels = "get('{}').getContext('2d').getImageData(0, 0, 400, 200).data.join()"
-    before, after = (browser.evaluate(pixels.format(name)) for name in ("filmBaseline", "filmLaw"))
-    force = browser.evaluate("film.designs[0].dampers[0].force")
-    assert before != after and set(before.split(",")) != {"0"}
-    browser.type('[data-path="rebound_rate"]', "9000")
-    assert browser.evaluate(pixels.format("filmLaw")) != after  # as the sliders are set
-    assert browser.evaluate("film.designs[0].dampers[0].force") == force
-    assert "drawn as at 20 m/s" not in browser.evaluate("get('filmNote').textContent")
-    for dark in (False, True):
-        browser.open(file, width=390, height=844, dark=dark)
-        assert browser.evaluate("document.documentElement.scrollWidth") <= 390
-        assert browser.evaluate("get('filmLaw').getBoundingClientRect().right") <= 390
-    assert not browser.troubles()
-
-
 def test_a_page_is_the_same_every_time_and_needs_nothing_else(tmp_path):
     text = page(LAWS["sum of lags"](), tmp_path).read_text(encoding="utf-8")
     assert "{{" not in text and "http" not in text.replace("http-equiv", "") and "src=" not in text

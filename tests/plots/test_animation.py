@@ -9,7 +9,7 @@ import pytest
 from jaxdamp import plots, roads, simulate
 from jaxdamp.dampers import Linear
 from jaxdamp.vehicles import presets
-from tests.export.browser import started
+from tests.export.browser import is_played_and_set, started
 
 
 ROAD = roads.cosine_bump(0.05, start=0.1, length=3.0, speed=15.0)
@@ -80,13 +80,7 @@ def test_it_plays_in_a_browser(half_car, tmp_path):
     with started() as browser:
         browser.open(page)
         assert browser.evaluate("document.querySelector('h1').textContent") == "<i>bump</i>"
-        browser.wait("film.time > 0.02")  # it plays by itself
-        browser.click("#play")
-        stopped = browser.evaluate("film.time")
-        browser.settle()
-        assert browser.evaluate("film.time") == stopped
-        browser.choose("#time", "0.25")
-        assert browser.evaluate("find('now').textContent") == "0.25 of 0.50 s"
+        is_played_and_set(browser, "0.25", "0.25 of 0.50 s")
         for width in (390, 1280):
             browser.open(page, width=width)
             assert browser.evaluate("document.documentElement.scrollWidth") <= width

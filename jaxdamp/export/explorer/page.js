@@ -14,7 +14,7 @@ const iso = DATA.road.iso;
 const drawnRoads = iso.drawn.map(({ amplitude, phase }) => ({ amplitude: unpacked(amplitude), phase: unpacked(phase) }));
 const profile = DATA.road.profile && { ...DATA.road.profile, heights: DATA.road.profile.heights.map(unpacked) };
 const charts = Object.fromEntries(["loopVelocity", "loopStroke", "spectrum", "trace"].map((id) => [id, new Chart(get(id))]));
-const film = new Film({ play: get("filmPlay"), speed: get("filmSpeed"), time: get("filmTime"), now: get("filmNow") });
+const film = new Film(get("filmBar"));
 const sides = {
   law: { program: LAW, states: DATA.law.states, sizes: DATA.law.sizes },
   baseline: { program: BASELINE, states: DATA.baseline.states, sizes: DATA.baseline.sizes },
