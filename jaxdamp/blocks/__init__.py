@@ -6,6 +6,7 @@ from jaxdamp.blocks.store import (
     AbstractStore as AbstractStore,
     BlockStore as BlockStore,
     Variable as Variable,
+    import_zarr as import_zarr,
     stored_blocks as stored_blocks,
 )
 

@@ -85,7 +85,7 @@ class BlockStore(AbstractStore):
         self._identity = {**identity, "block": " x ".join(map(str, blocks.box))}
         if not self.path.parent.is_dir():
             _checks.refuse("file", "lie in a folder that exists", self.path, "Make the folder first.")
-        _zarr()
+        import_zarr()
 
     def create(
         self,
@@ -124,7 +124,7 @@ class BlockStore(AbstractStore):
         variables: Mapping[str, Variable],
         coordinates: Mapping[str, tuple[str, np.ndarray, dict[str, str]]],
     ) -> None:
-        zarr = _zarr()
+        zarr = import_zarr()
         group = zarr.open_group(folder, mode="w")
         group.attrs[IDENTITY] = json.dumps(self._identity)
         exact = [zarr.codecs.Crc32cCodec()]
@@ -164,7 +164,7 @@ class BlockStore(AbstractStore):
         """
         (size,), (box,) = self.blocks.shape, self.blocks.box
         longer = size + len(next(iter(known.values())))
-        group = _zarr().open_group(self.path, mode="r+")
+        group = import_zarr().open_group(self.path, mode="r+")
         for name in self._names:
             array: zarr.Array = group[name]  # pyright: ignore[reportAssignmentType]
             array.resize((longer, *array.shape[1:]))
@@ -177,13 +177,13 @@ class BlockStore(AbstractStore):
 
     def read(self, *names: str, start: int = 0, stop: int | None = None) -> dict[str, np.ndarray]:
         """Variables of all points along the first axis, or of some."""
-        group, stop = _zarr().open_group(self.path, mode="r"), self.blocks.shape[0] if stop is None else stop
+        group, stop = import_zarr().open_group(self.path, mode="r"), self.blocks.shape[0] if stop is None else stop
         return {name: np.asarray(group[name][start:stop]) for name in names}
 
     def _check(self) -> None:
         """Refuse a store of something else, with what differs."""
         try:
-            stored = json.loads(_zarr().open_group(self.path, mode="r").attrs[IDENTITY])
+            stored = json.loads(import_zarr().open_group(self.path, mode="r").attrs[IDENTITY])
         except Exception as error:
             remedy = "Choose another name, or delete the folder."
             raise ValueError(f"Argument `file`: {self.path} is no store of jaxdamp's ({error!r}). {remedy}") from error
@@ -203,11 +203,11 @@ class BlockStore(AbstractStore):
         return np.flatnonzero(self._marks() < 0)
 
     def _marks(self) -> np.ndarray:
-        return np.asarray(_zarr().open_group(self.path, mode="r")[DONE][:])
+        return np.asarray(import_zarr().open_group(self.path, mode="r")[DONE][:])
 
     def repair(self) -> int:
         """Read every block that is marked; those that are not as they were written are not done. Returns how many."""
-        group, damaged = _zarr().open_group(self.path, mode="r+"), 0
+        group, damaged = import_zarr().open_group(self.path, mode="r+"), 0
         for number in range(self.blocks.count):
             try:
                 whole = int(group[DONE][number]) < 0 or self._is_whole(group, number)
@@ -238,8 +238,8 @@ class BlockStore(AbstractStore):
         shape = tuple(part.stop - part.start for part in region)
         failed = int(np.count_nonzero(values["failed"]))
         try:
-            with _zarr().config.set({"array.write_empty_chunks": True}):  # a chunk that is not there was lost
-                group = _zarr().open_group(self.path, mode="r+")
+            with import_zarr().config.set({"array.write_empty_chunks": True}):  # a chunk that is not there was lost
+                group = import_zarr().open_group(self.path, mode="r+")
                 arrays = {name: group[name] for name in values}
             for name, column in values.items():
                 if failed or name not in FAILURES:  # what is not written is false and empty
@@ -268,20 +268,21 @@ def stored_blocks(path: Path) -> int:
         path: of the store.
     """
     try:
-        return int(_zarr().open_group(path, mode="r")[DONE].shape[0])
+        return int(import_zarr().open_group(path, mode="r")[DONE].shape[0])
     except (OSError, KeyError, ValueError):
         return 0
 
 
 def _enter(path: Path, known: Mapping[str, np.ndarray], start: int) -> None:
     """Write what is known of points from `start` on, empty texts too: a chunk that is not there was lost."""
-    with _zarr().config.set({"array.write_empty_chunks": True}):
-        group = _zarr().open_group(path, mode="r+")
+    with import_zarr().config.set({"array.write_empty_chunks": True}):
+        group = import_zarr().open_group(path, mode="r+")
         for name, values in known.items():
             group[name][start : start + len(values)] = values
 
 
-def _zarr() -> ModuleType:
+def import_zarr() -> ModuleType:
+    """The library of stores; without it, what to install."""
     try:
         import zarr
         import zarr.codecs

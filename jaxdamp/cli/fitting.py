@@ -85,7 +85,7 @@ def fit(
         rig: what the test machine adds.
         cross_validate: predict each record by the best law fitted to the others.
         each: what a damper of a production line is: every folder with records, every file, or every name in a table
-            with the columns damper and file.
+            with the columns damper and file; pip install 'jaxdamp[cluster]'.
         in_control: so many dampers at the beginning were in control: limits of control charts of all, with --each.
     """
     given = {"held_out": held_out, "group_by": group_by, "cross_validate": cross_validate, "baseline": baseline}

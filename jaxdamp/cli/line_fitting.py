@@ -7,6 +7,7 @@ from pathlib import Path
 from jaxdamp import _checks, bench, identify
 from jaxdamp._checks import ArgumentError
 from jaxdamp.bench import DamperRecords
+from jaxdamp.blocks import import_zarr
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.jobs import Output, job, write_tables
 from jaxdamp.cli.limits import bounds_in_si
@@ -87,6 +88,7 @@ def _checked(files: Sequence[Path], law: Sequence[str], refused: Sequence[Refuse
         _checks.refuse("law", "be one law for all dampers", ", ".join(names) or "left out", 'See "jaxdamp laws".')
     if len(files) != 1:
         _checks.refuse("each", "be given with one folder or one table of files", f"given with {len(files)}")
+    import_zarr()  # before anything is read
     return names[0]
 
 

@@ -1,6 +1,7 @@
 """`jaxdamp fit --each`: the dampers of a production line, with control charts of their numbers."""
 
 import csv
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +52,12 @@ def test_a_line_is_fitted_and_charted_and_later_only_what_is_new(line: Path) -> 
     assert "individuals high" in found["No 11"]["signals"] and not found["No 7"]["remark"]
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "out of control at the end" in page and "No 11" in page and (out / "result.png").is_file()
+
+
+def test_without_the_library_of_stores_it_says_so_before_it_reads(line: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "zarr", None)
+    said = jaxdamp("fit", line, "--each", "folder", *LIMITS, "--out", line.with_name("out"), code=2).output
+    assert "pip install 'jaxdamp[cluster]'" in " ".join(said.split()) and "Reading" not in said
 
 
 def test_what_a_line_does_not_take_is_refused(line: Path, tmp_path: Path) -> None:

@@ -69,6 +69,25 @@ def is_ride(shown, vehicle, road, **options):
         np.testing.assert_allclose(value, float(expected[name]), CLOSE, 1e-12, err_msg=name)
 
 
+def is_moving(browser, vehicle, road):
+    """The picture in motion has the heights and forces of the library."""
+    substeps = browser.evaluate("state.substeps")
+    response = simulate(vehicle, road, duration=DURATION, substeps=substeps)
+    shown = browser.evaluate("state.results.law.moving.map((values) => [...values])")
+    coordinates = len(vehicle.coordinates)
+    expected = np.asarray(response.motion)[::10, :coordinates].T
+    np.testing.assert_allclose(shown[:coordinates], expected, CLOSE, CLOSE * np.abs(expected).max())
+    forces = np.array([response[f"{name}_force"][::10] for name in response.dampers])
+    np.testing.assert_allclose(shown[coordinates:], forces, CLOSE, CLOSE * np.abs(forces).max())
+    upper = browser.evaluate("DATA.drawing.dampers[0].ends[0]")
+    point = browser.evaluate(f"DATA.drawing.points[{upper}]")
+    height = response["z_sprung"] + (point["ahead"] * response["pitch"] if "pitch" in response.units else 0.0)
+    drawn = browser.evaluate(f"[...film.designs[1].points[{upper}].height]")
+    np.testing.assert_allclose(drawn, 1e4 * np.asarray(height)[::10], 1e-6, 1e-6)
+    road_drawn = browser.evaluate("film.designs[1].wheels.map((wheel) => [...wheel.road])")
+    np.testing.assert_allclose(road_drawn, 1e4 * np.asarray(response.road)[::10].T, CLOSE, 1e-6)
+
+
 def record(law, name="measured", time=None):
     time = np.arange(0.0, 1.5, 1e-3) if time is None else time
     turn = 2.0 * np.pi * 2.0 * time
