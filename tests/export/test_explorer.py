@@ -125,6 +125,19 @@ def test_a_moved_slider_is_followed_by_the_numbers_of_the_library(tmp_path, brow
     assert not browser.troubles()
 
 
+def test_a_number_changed_before_the_check_of_the_step_leaves_the_step(tmp_path, browser):
+    page(VALVE, tmp_path, browser)
+    substeps = browser.evaluate("state.substeps")
+    later = "window.requestAnimationFrame = (draw) => setTimeout(draw, 3 * CHECK_AFTER);"
+    change = "const box = document.querySelector('[data-path=\"sprung_mass\"]'); box.value = 600;"
+    wait = "new Promise((done) => setTimeout(() => done(state.substeps), 2 * CHECK_AFTER))"
+    browser.evaluate(f"{later} {change} box.dispatchEvent(new Event('input'))")
+    assert browser.evaluate(wait) == substeps
+    browser.evaluate("state.substeps *= 2")
+    browser.click("#reset")
+    assert browser.evaluate("state.substeps") == substeps
+
+
 @pytest.mark.slow
 def test_roads_spectra_and_channels(tmp_path, browser):
     law = Lag(VALVE, 0.004) + GasSpring(2e6, 6e-5, 1e-4, 1.3)  # its rest depends on its numbers

@@ -70,8 +70,7 @@ function chooseRoad() {
   attempt("roadError", () => {
     const heights = roadHeights();
     state.road = { heights, rates: heights.map((each) => rates(each, DATA.dt)) };
-    state.substeps = DATA.substeps;
-    state.results.baseline = null;
+    firstStep();
     refresh();
   });
 }
@@ -95,6 +94,11 @@ function refreshRide() {
   clearTimeout(state.timer);
   get("stepNote").textContent = "";
   state.timer = setTimeout(checkStep, CHECK_AFTER);
+}
+
+function firstStep() {
+  state.substeps = DATA.substeps;
+  state.results.baseline = null;
 }
 
 // The step halved: by how much the metrics differ; halved for good if by more than a percent.
@@ -128,8 +132,10 @@ function refresh() {
   get("timing").textContent = `${readable(state.milliseconds, 2)} ms`;
 }
 
-// At the next frame, once for all changes before it.
+// At the next frame, once for all changes before it. The step is not checked until then: that would compare a run
+// of the old numbers with one of the new.
 function schedule() {
+  clearTimeout(state.timer);
   if (state.waiting) return;
   state.waiting = true;
   requestAnimationFrame(() => { state.waiting = false; refresh(); });
@@ -339,7 +345,11 @@ function begin() {
   get("channel").addEventListener("input", () => attempt("roadError", showChannel));
   for (const id of ["dropSign", "dropForce"]) get(id).addEventListener("input", takeDropped);
   get("export").addEventListener("click", download);
-  get("reset").addEventListener("click", () => { state.controls.flat().forEach((control) => control.reset(true)); schedule(); });
+  get("reset").addEventListener("click", () => {
+    state.controls.flat().forEach((control) => control.reset(true));
+    firstStep();
+    schedule();
+  });
   get("file").addEventListener("change", () => get("file").files[0] && dropped(get("file").files[0]));
   get("theme").addEventListener("click", () => {
     const root = document.documentElement, dark = getComputedStyle(root).colorScheme === "dark";
