@@ -1,7 +1,6 @@
 """`jaxdamp tune`: the free parameters of a vehicle for a ride metric, with limits; and `jaxdamp sweep`."""
 
 import json
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,8 +9,9 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from jaxdamp import Ride, _checks, export, sweep, tune
+from jaxdamp import Ride, _checks, export, tune
 from jaxdamp._pieces import kept_file
+from jaxdamp.blocks import import_zarr
 from jaxdamp.cli.choosing import choose, settings_of
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.controlling import Controlling
@@ -19,6 +19,7 @@ from jaxdamp.cli.jobs import Output, job, write_tables
 from jaxdamp.cli.limits import axes_in_si, bounds_in_si, in_si
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.riding import Driving, beyond_vehicles, unusual
+from jaxdamp.cli.sharing import sweep_part, swept
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, read_module, with_law, write_laws
 from jaxdamp.cli.words import Axis
 from jaxdamp.control import Controlled
@@ -194,10 +195,15 @@ def sweep_command(
     driving: Driving,
     how: Annotated[Call, "sweeps.sweep"],
     baseline: Path | None = None,
+    block: str | None = None,
     resume: bool = False,
     output: Output,
 ) -> None:
     """Compute ride metrics over a grid of parameters: curves, maps and a table.
+
+    With --block, a process computes its part of the sweep into a store, the folder of --out with .zarr behind its name;
+    any number of them, one after the other or at once, as an array job has them. The same command without --block
+    computes what is missing there, and writes the results.
 
     Arguments:
         road: iso:A to iso:H, white:A to white:H, bump:HEIGHT:LENGTH [m], or a file of position, height.
@@ -205,7 +211,11 @@ def sweep_command(
         metric: comfort, travel, grip, or names of ride metrics.
         limit: limits.
         baseline: to compare with: another law, or another tuning's vehicle.json, as JSON.
+        block: compute this part of the sweep only, into a store; pip install 'jaxdamp[cluster]'.
     """
+    store = output.store("sweep")
+    if block is not None:
+        import_zarr()  # before anything is computed
     car = parse_vehicle(vehicle)(None if start is None else read_law("start", start))
     (surface,), run = driving.over(road)
     white = isinstance(surface, WhiteRoad)
@@ -220,12 +230,13 @@ def sweep_command(
     ride({name: values[0] for name, values in axes.items() if not ride.out_of_domain({name: values[:1]})[0]})
     screen.points(said)
     screen.points(unusual(road, driving.speed), style="yellow")
+    if block is not None:
+        sweep_part(screen, ride, axes, how, store, block)
+        return
     with job(screen, "sweep", output, resume=resume) as work:
-        with screen.stage("Driving") as advance, warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            shown = {"progress": lambda done, total: advance(f"{done} of {total} points", done)}
-            data = sweep(ride, axes, **how.arguments(file=kept_file("sweep.nc"), **shown))
-        remarks = beyond_vehicles(car, axes) + [str(warning.message) for warning in caught]
+        data, warned = swept(screen, ride, axes, how, store if store.exists() else kept_file("sweep.nc"))
+        data = data.load()
+        remarks = beyond_vehicles(car, axes) + warned
         at = _present(car, axes)
         at_start = {name: float(value) for name, value in ride(at if len(at) == len(axes) else None).items()}
         spans = limit_spans(limits, names, at_start)
