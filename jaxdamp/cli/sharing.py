@@ -51,20 +51,20 @@ def swept(
         ValueError: a store of another sweep, with the options that differ.
     """
     stored = file if file is not None and file.suffix == ".zarr" else None
-    given = json.dumps(resuming.given_now(), ensure_ascii=False)
+    now = resuming.given_now()
     with screen.stage("Driving") as advance, warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
 
         def tell(done: int, total: int) -> None:
             if stored is not None:
-                note_command(stored, given)
+                note_command(stored, json.dumps(now, ensure_ascii=False))
             advance(f"{done} of {total} points", done)
 
         try:
             data = sweep(ride, axes, **how.arguments(file=file, cluster=part, progress=tell))
         except ArgumentError as error:
-            before = json.loads(command_of(stored) or "{}") if stored is not None and error.argument == "file" else {}
-            differences = resuming.differences_between(before, resuming.given_now())
+            other = now and stored is not None and error.argument == "file"
+            differences = resuming.differences_between(json.loads(command_of(stored) or "{}"), now) if other else []
             if not differences:
                 raise
             again = "Give what was given then, name another folder with --out, or delete the store to begin anew."
