@@ -63,8 +63,9 @@ def swept(
         try:
             data = sweep(ride, axes, **how.arguments(file=file, cluster=part, progress=tell))
         except ArgumentError as error:
-            other = now and stored is not None and error.argument == "file"
-            differences = resuming.differences_between(json.loads(command_of(stored) or "{}"), now) if other else []
+            if stored is None or error.argument != "file":
+                raise
+            differences = resuming.differences_between(json.loads(command_of(stored) or "{}"), now) if now else []
             if not differences:
                 raise
             again = "Give what was given then, name another folder with --out, or delete the store to begin anew."
