@@ -276,7 +276,11 @@ def stored_blocks(path: Path) -> int:
 
 
 def command_of(path: Path) -> str:
-    """What a command noted in a store; empty if none did."""
+    """What a command noted in a store; empty if none did.
+
+    Arguments:
+        path: of the store.
+    """
     try:
         return str(import_zarr().open_group(path, mode="r").attrs.get(COMMAND, ""))
     except (OSError, ValueError):
@@ -284,7 +288,12 @@ def command_of(path: Path) -> str:
 
 
 def note_command(path: Path, text: str) -> None:
-    """Note in a store what fills it."""
+    """Note in a store what fills it.
+
+    Arguments:
+        path: of the store.
+        text: the note.
+    """
     if command_of(path) != text:
         import_zarr().open_group(path, mode="r+").attrs[COMMAND] = text
 

@@ -11,7 +11,6 @@ import typer
 
 from jaxdamp import Ride, _checks, export, tune
 from jaxdamp._pieces import kept_file
-from jaxdamp.blocks import import_zarr
 from jaxdamp.cli.choosing import choose, settings_of
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.controlling import Controlling
@@ -214,8 +213,6 @@ def sweep_command(
         block: compute this part of the sweep only, into a store; pip install 'jaxdamp[cluster]'.
     """
     store = output.store("sweep")
-    if block is not None:
-        import_zarr()  # before anything is computed
     car = parse_vehicle(vehicle)(None if start is None else read_law("start", start))
     (surface,), run = driving.over(road)
     white = isinstance(surface, WhiteRoad)
