@@ -183,7 +183,7 @@ def free_parameters(
     Arguments:
         tree: a law, a vehicle or any module.
         over: paths, last parts of paths or patterns with `*` and `**` (`match_paths`); all parameters if not given. A
-            command (a coil current, a click) is free only by its name.
+            command (a coil current, a click) is free only by its own name, as in `"**.command"`.
         freeze: names of parameters to hold at their values.
         bounds: extra limits `{path: (lower, upper)}` in the parameter's unit.
         tie: parameters that take the values of others, as `{"front.damper.**": "rear.damper.**"}`; `*` and `**` stand
@@ -202,7 +202,7 @@ def free_parameters(
     """
     _checks.untraced("bounds", dict(bounds or {}), "Give plain numbers, which are known before a program is compiled.")
     names = ["**"] if over is None else name_patterns("over", over)
-    all_parameters = named_parameters(tree, names)
+    all_parameters = _known(tree, names, tie)
     known = [p.path for p in all_parameters]
     if not known:
         remedy = "Declare its numbers by `parameter(unit, meaning)`; the weights of a network are trained by optax."
@@ -225,6 +225,12 @@ def free_parameters(
     if not chosen:
         raise ValueError(f"All parameters are frozen, nothing is left to change: {', '.join(known)}.")
     return FreeParameters(tree, tuple(chosen), tuple(pair for pair in leaders.items() if pair[1] in free))
+
+
+def _known(tree: object, names: Sequence[str], tie: object) -> list[Parameter]:
+    """All parameters, and the commands that are named or tied."""
+    tied = (*tie, *tie.values()) if isinstance(tie, Mapping) else ()  # anything else is refused where ties are resolved
+    return named_parameters(tree, [*names, *map(str, tied)])
 
 
 def _limits_by_path(

@@ -130,20 +130,20 @@ def replace(tree: Tree, values: Mapping[str, object]) -> Tree:
 
 
 def named_parameters(tree: object, names: Iterable[str]) -> list[Parameter]:
-    """All parameters, and those commands (coil currents, clicks) that a name without `*` stands for.
+    """All parameters, and those commands (coil currents, clicks) whose own name, without `*`, ends one of the names.
 
     Arguments:
         tree: a law, a vehicle or any module.
         names: names and patterns, as in `match_paths`.
 
     >>> from jaxdamp.dampers import Linear, Scheduled
-    >>> law = Scheduled((Linear(900.0), Linear(1500.0)), levels=[0.0, 1.0], command=0.5)
-    >>> [[p.path for p in named_parameters(law, [name])][-1] for name in ("command", "**")]
-    ['command', 'laws.1.rate']
+    >>> law = 2.0 * Scheduled((Linear(900.0), Linear(1500.0)), levels=[0.0, 1.0], command=0.5)
+    >>> [[p.path for p in named_parameters(law, [name])][-2] for name in ("*.command", "law.*")]
+    ['law.command', 'law.laws.1.rate']
     """
     every = parameters(tree, commands=True)
     paths = [p.path for p in every]
-    hits = [matching(paths, name) for name in names if "*" not in name]
+    hits = [matching(paths, name) for name in names if "*" not in name.rpartition(".")[2]]
     named = set(itertools.chain(*hits)) if all(hits) else set(paths)  # all are offered in place of a wrong name
     return [p for p in every if not p.command or p.path in named]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import Ride, dampers, roads, sweep, tune, vehicles
-from jaxdamp.parameters import get
+from jaxdamp.parameters import free_parameters, get
 
 
 COMFORT, TYRE = "rms_sprung_acceleration", "rms_dynamic_tyre_load"
@@ -70,6 +70,9 @@ def test_clicks_are_chosen_and_swept() -> None:
     assert result.to_dict()["combinations"]["rows"][0]["limits"] == "met"
     with pytest.raises(ValueError, match=r"No parameter is named 'damper.comand': did you mean 'damper.command'"):
         tune.minimise(COMFORT, car, WHITE, over=["damper.comand"])
+    two = vehicles.presets.half_car_002(law)
+    tie, named = {"front.*.command": "rear.*.command"}, ["rear.damper.command"]
+    assert free_parameters(two, over=["**.command"], tie=tie).names == named != free_parameters(two, over=["**"]).names
     between = tune.minimise(COMFORT, car, WHITE, over=["damper.command"])  # any current between two
     assert between.parameters[0].lower == 1.0 and between.parameters[0].upper == 6.0
 
