@@ -1,7 +1,7 @@
 """Roots with the derivatives of the implicit function theorem: of an increasing function, and of optimistix."""
 
 from collections.abc import Callable
-from typing import final
+from typing import NamedTuple, final
 
 import equinox as eqx
 import jax
@@ -9,10 +9,15 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Bool, PyTree
 
+from jaxdamp._limits import at_most, within
 from jaxdamp._matrices import solve
 from jaxdamp._sharded import varying_as
-from jaxdamp._types import Scalar
+from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp.configuration import target
+
+
+NEWTON_STEPS, LEAST_SHARE = 40, 0.02  # of a search of two numbers, and the least share of a step
+HALVINGS = 50  # of an interval
 
 
 def increasing_root(
@@ -99,13 +104,107 @@ def increasing_root(
 Pair = tuple[Scalar, Scalar]
 
 
-def newton_of_two(function: Callable[[Pair], Pair], at: Pair) -> Pair:
+class At(NamedTuple):
+    """Where a search of two numbers stands: the numbers, what is missing there, and the inverse of its slopes."""
+
+    roots: Pair
+    missing: Pair
+    inverse: tuple[Pair, Pair]
+
+    def step(self, missing: Pair) -> Pair:
+        """The step of Newton's method by these slopes."""
+        (aa, ab), (ba, bb) = self.inverse
+        return -(aa * missing[0] + ab * missing[1]), -(ba * missing[0] + bb * missing[1])
+
+
+def _at(function: Callable[[Pair], Pair], roots: Pair) -> At:
+    one, zero = jnp.ones_like(roots[0]), jnp.zeros_like(roots[0])
+    missing, (f_a, g_a) = jax.jvp(function, (roots,), ((one, zero),))
+    _, (f_b, g_b) = jax.jvp(function, (roots,), ((zero, one),))
+    return At(roots, missing, _inverse(f_a, f_b, g_a, g_b))
+
+
+def _inverse(f_a: Scalar, f_b: Scalar, g_a: Scalar, g_b: Scalar) -> tuple[Pair, Pair]:
+    share = 1.0 / (f_a * g_b - f_b * g_a)
+    return (g_b * share, -f_b * share), (-g_a * share, f_a * share)
+
+
+def newton_of_two(function: Callable[[Pair], Pair], roots: Pair) -> Pair:
     """Where Newton's method for two functions of two numbers goes from there."""
-    one, zero = jnp.ones_like(at[0]), jnp.zeros_like(at[0])
-    (f, g), (f_a, g_a) = jax.jvp(function, (at,), ((one, zero),))
-    _, (f_b, g_b) = jax.jvp(function, (at,), ((zero, one),))
-    per_determinant = 1.0 / (f_a * g_b - f_b * g_a)
-    return at[0] + (f_b * g - g_b * f) * per_determinant, at[1] + (g_a * f - f_a * g) * per_determinant
+    at = _at(function, roots)
+    step = at.step(at.missing)
+    return roots[0] + step[0], roots[1] + step[1]
+
+
+def root_of_two(function: Callable[[Pair], Pair], guess: Pair, most: Pair) -> Pair:
+    """Solve f(a, b) = 0 and g(a, b) = 0 with |a| and |b| of at most `most`.
+
+    Newton's method, whose steps are made shorter until a step by the same slopes from their end would be shorter than
+    they are (the natural monotonicity test of Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 3.3).
+    Where that ends nowhere, as it may between kinks (1 of 2000 random stages of a `TwinTube`, none along motions), the
+    interval of b is halved, and for each b that of a. Derivatives as of `increasing_root`; the last step is a plain
+    one, so that second derivatives are right which pass through the search.
+
+    Arguments:
+        function: (a, b) to (f, g); f increases with a, and g with b along f = 0.
+        guess: first values.
+        most: limits of both, of either sign.
+    """
+
+    def solve(f: Callable[[Pair], Pair], roots: Pair) -> Pair:
+        limits = jax.lax.stop_gradient(most)
+        close = max(1e-7, float(jnp.finfo(roots[0].dtype).eps) ** 0.5)  # relative; what remains is about its square
+
+        def ahead(roots: Pair, step: Pair, share: ScalarLike) -> Pair:
+            a, b = (within(r + share * s, -m, m) for r, s, m in zip(roots, step, limits, strict=True))
+            return a, b
+
+        def far(at: At) -> Bool[Array, ""]:
+            """Whether the next step is not short; not so if there is no number."""
+            (a, b), moved = at.roots, at.step(at.missing)
+            least = [close * (jnp.abs(r) + 1e-3 * m) for r, m in zip((a, b), limits, strict=True)]
+            return (jnp.abs(moved[0]) > least[0]) | (jnp.abs(moved[1]) > least[1])
+
+        def newton(now: PyTree) -> PyTree:
+            count, at, share = now
+            step = at.step(at.missing)
+            there = _at(f, ahead(at.roots, step, share))
+            before, after = (jnp.maximum(*map(jnp.abs, s)) for s in (step, at.step(there.missing)))
+            good = (count == 0) | (after <= (1.0 - 0.25 * share) * before) | (share < LEAST_SHARE)
+            at = jax.tree.map(lambda new, old: jnp.where(good, new, old), there, at)
+            return count + 1, at, jnp.where(good, at_most(2.0 * share, 1.0), 0.4 * share)
+
+        def halve(now: PyTree) -> PyTree:
+            count, at, low, high = now
+            b = 0.5 * (low + high)
+
+            def halve_a(now: PyTree) -> PyTree:
+                count, low, high = now
+                a = 0.5 * (low + high)
+                above = f((a, b))[0] > 0.0
+                return count + 1, jnp.where(above, low, a), jnp.where(above, a, high)
+
+            _, below, above = jax.lax.while_loop(lambda now: now[0] < HALVINGS, halve_a, (0, -limits[0], limits[0]))
+            at = _at(f, (0.5 * (below + above), b))
+            positive = at.missing[1] > 0.0
+            return count + 1, at, jnp.where(positive, low, b), jnp.where(positive, b, high)
+
+        zero, one = jnp.zeros_like(roots[0]), jnp.ones_like(roots[0])
+        begin = 0, At(ahead(roots, (zero, zero), 0.0), (zero, zero), ((zero, zero), (zero, zero))), one
+        going = lambda now: (now[0] == 0) | (far(now[1]) & (now[0] < NEWTON_STEPS))
+        at = jax.lax.while_loop(going, newton, varying_as(begin))[1]
+        needed = far(at)
+        halving = lambda now: needed & (now[0] < HALVINGS)
+        at = jax.lax.while_loop(halving, halve, varying_as((0, at, -limits[1], limits[1])))[1]
+        return ahead(at.roots, at.step(at.missing), 1.0)
+
+    def tangent_solve(linear: Callable[[Pair], Pair], value: Pair) -> Pair:
+        one, zero = jnp.ones_like(value[0]), jnp.zeros_like(value[0])
+        (f_a, g_a), (f_b, g_b) = linear((one, zero)), linear((zero, one))
+        (aa, ab), (ba, bb) = _inverse(f_a, f_b, g_a, g_b)
+        return aa * value[0] + ab * value[1], ba * value[0] + bb * value[1]
+
+    return jax.lax.custom_root(function, jax.lax.stop_gradient(guess), solve, tangent_solve)
 
 
 @final

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp._limits import at_least, at_most, within
-from jaxdamp._root import Pair, increasing_root, newton_of_two
+from jaxdamp._root import Pair, newton_of_two, root_of_two
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._states import own_states
 from jaxdamp.dampers._tube import AbstractTube, Oil, oil_stiffness
@@ -133,25 +133,14 @@ class TwinTube(AbstractTube):
         largest = at_least(at_least(free[0], free[1]), free[2]) - at_most(at_most(free[0], free[1]), free[2])
         most = self.piston.root(largest), self.base.root(largest)
 
-        def limited(roots: tuple[Scalar, ...]) -> Pair:
-            return within(roots[0], -most[0], most[0]), within(roots[1], -most[1], most[1])
-
-        guess = limited(now.roots)
+        if search:
+            roots = root_of_two(surplus, now.roots, most)
+            return Oil(jnp.stack(self._rates(v, roots)), roots)
+        guess = now.roots
         for _ in range(2):
-            guess = limited(newton_of_two(surplus, guess))
-        if not search:
-            return Oil(jnp.stack(self._rates(v, guess)), guess)
-
-        def piston_root(root: Scalar) -> Scalar:
-            return increasing_root(lambda own: surplus((own, root))[0], guess[0], -most[0], most[0], steps=20)
-
-        def surplus_of_base(root: Scalar) -> Scalar:
-            return surplus((piston_root(root), root))[1]
-
-        # One search within the other: with brackets it ends at the root also where valves open at a kink.
-        root = increasing_root(surplus_of_base, guess[1], -most[1], most[1], steps=20)
-        roots = piston_root(root), root
-        return Oil(jnp.stack(self._rates(v, roots)), roots)
+            a, b = newton_of_two(surplus, guess)
+            guess = within(a, -most[0], most[0]), within(b, -most[1], most[1])
+        return Oil(jnp.stack(self._rates(v, guess)), guess)
 
     def incompressible(self) -> AbstractDamper:
         """`piston + base + gas + friction`, the limit B → ∞ without cavities: no states, for sweeps and slow motion."""
