@@ -136,14 +136,61 @@ def newton_of_two(function: Callable[[Pair], Pair], roots: Pair) -> Pair:
     return roots[0] + step[0], roots[1] + step[1]
 
 
+class _Search(NamedTuple):
+    """Steps of a search of two numbers of at most `most`."""
+
+    function: Callable[[Pair], Pair]
+    most: Pair
+    close: float  # relative length of the last step; what remains is about its square
+
+    def ahead(self, roots: Pair, step: Pair, share: ScalarLike) -> Pair:
+        """A share of the step away, within the limits."""
+        a, b = (within(r + share * s, -m, m) for r, s, m in zip(roots, step, self.most, strict=True))
+        return a, b
+
+    def far(self, at: At) -> Bool[Array, ""]:
+        """Whether the next step is not short; not so where there is no number, which no search mends."""
+        long = [
+            jnp.abs(s) > self.close * (jnp.abs(r) + 1e-3 * m)
+            for s, r, m in zip(at.step(at.missing), at.roots, self.most, strict=True)
+        ]
+        return long[0] | long[1]
+
+    def newton(self, now: PyTree) -> PyTree:
+        """A share of a step of Newton's method; a lesser one next time, from the same place, if it is too long."""
+        count, at, share = now
+        step = at.step(at.missing)
+        there = _at(self.function, self.ahead(at.roots, step, share))
+        before, after = (jnp.maximum(*map(jnp.abs, s)) for s in (step, at.step(there.missing)))
+        good = (count == 0) | (after <= (1.0 - 0.25 * share) * before) | (share < LEAST_SHARE)
+        at = jax.tree.map(lambda new, old: jnp.where(good, new, old), there, at)
+        return count + 1, at, jnp.where(good, at_most(2.0 * share, 1.0), 0.4 * share)
+
+    def halve(self, now: PyTree) -> PyTree:
+        """Half the interval of b, by the a at its middle, whose interval is halved until it is a number."""
+        count, _, low, high = now
+        b = 0.5 * (low + high)
+
+        def halve_a(now: PyTree) -> PyTree:
+            count, low, high = now
+            a = 0.5 * (low + high)
+            above = self.function((a, b))[0] > 0.0
+            return count + 1, jnp.where(above, low, a), jnp.where(above, a, high)
+
+        begin = varying_as((0, -self.most[0], self.most[0]))
+        _, below, above = jax.lax.while_loop(lambda now: now[0] < HALVINGS, halve_a, begin)
+        at = _at(self.function, (0.5 * (below + above), b))
+        positive = at.missing[1] > 0.0
+        return count + 1, at, jnp.where(positive, low, b), jnp.where(positive, b, high)
+
+
 def root_of_two(function: Callable[[Pair], Pair], guess: Pair, most: Pair) -> Pair:
     """Solve f(a, b) = 0 and g(a, b) = 0 with |a| and |b| of at most `most`.
 
-    Newton's method, whose steps are made shorter until a step by the same slopes from their end would be shorter than
-    they are (the natural monotonicity test of Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 3.3).
-    Where that ends nowhere, as it may between kinks (1 of 2000 random stages of a `TwinTube`, none along motions), the
-    interval of b is halved, and for each b that of a. Derivatives as of `increasing_root`; the last step is a plain
-    one, so that second derivatives are right which pass through the search.
+    Newton's method, with steps so short that a step by the same slopes from their end is shorter than they are (the
+    natural monotonicity test of Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 3.3). Where that ends
+    nowhere, as it can between kinks, the interval of b is halved, and for each b that of a. Derivatives as of
+    `increasing_root`. The last step is a plain one, so that second derivatives that pass through the search are right.
 
     Arguments:
         function: (a, b) to (f, g); f increases with a, and g with b along f = 0.
@@ -152,51 +199,19 @@ def root_of_two(function: Callable[[Pair], Pair], guess: Pair, most: Pair) -> Pa
     """
 
     def solve(f: Callable[[Pair], Pair], roots: Pair) -> Pair:
-        limits = jax.lax.stop_gradient(most)
-        close = max(1e-7, float(jnp.finfo(roots[0].dtype).eps) ** 0.5)  # relative; what remains is about its square
-
-        def ahead(roots: Pair, step: Pair, share: ScalarLike) -> Pair:
-            a, b = (within(r + share * s, -m, m) for r, s, m in zip(roots, step, limits, strict=True))
-            return a, b
-
-        def far(at: At) -> Bool[Array, ""]:
-            """Whether the next step is not short; not so if there is no number."""
-            (a, b), moved = at.roots, at.step(at.missing)
-            least = [close * (jnp.abs(r) + 1e-3 * m) for r, m in zip((a, b), limits, strict=True)]
-            return (jnp.abs(moved[0]) > least[0]) | (jnp.abs(moved[1]) > least[1])
-
-        def newton(now: PyTree) -> PyTree:
-            count, at, share = now
-            step = at.step(at.missing)
-            there = _at(f, ahead(at.roots, step, share))
-            before, after = (jnp.maximum(*map(jnp.abs, s)) for s in (step, at.step(there.missing)))
-            good = (count == 0) | (after <= (1.0 - 0.25 * share) * before) | (share < LEAST_SHARE)
-            at = jax.tree.map(lambda new, old: jnp.where(good, new, old), there, at)
-            return count + 1, at, jnp.where(good, at_most(2.0 * share, 1.0), 0.4 * share)
-
-        def halve(now: PyTree) -> PyTree:
-            count, at, low, high = now
-            b = 0.5 * (low + high)
-
-            def halve_a(now: PyTree) -> PyTree:
-                count, low, high = now
-                a = 0.5 * (low + high)
-                above = f((a, b))[0] > 0.0
-                return count + 1, jnp.where(above, low, a), jnp.where(above, a, high)
-
-            _, below, above = jax.lax.while_loop(lambda now: now[0] < HALVINGS, halve_a, (0, -limits[0], limits[0]))
-            at = _at(f, (0.5 * (below + above), b))
-            positive = at.missing[1] > 0.0
-            return count + 1, at, jnp.where(positive, low, b), jnp.where(positive, b, high)
-
+        search = _Search(f, jax.lax.stop_gradient(most), max(1e-7, float(jnp.finfo(roots[0].dtype).eps) ** 0.5))
         zero, one = jnp.zeros_like(roots[0]), jnp.ones_like(roots[0])
-        begin = 0, At(ahead(roots, (zero, zero), 0.0), (zero, zero), ((zero, zero), (zero, zero))), one
-        going = lambda now: (now[0] == 0) | (far(now[1]) & (now[0] < NEWTON_STEPS))
-        at = jax.lax.while_loop(going, newton, varying_as(begin))[1]
-        needed = far(at)
-        halving = lambda now: needed & (now[0] < HALVINGS)
-        at = jax.lax.while_loop(halving, halve, varying_as((0, at, -limits[1], limits[1])))[1]
-        return ahead(at.roots, at.step(at.missing), 1.0)
+        nothing = (zero, zero)
+        begin = 0, At(search.ahead(roots, nothing, 0.0), nothing, (nothing, nothing)), one
+
+        def going(now: PyTree) -> Bool[Array, ""]:
+            return (now[0] == 0) | (search.far(now[1]) & (now[0] < NEWTON_STEPS))
+
+        at = jax.lax.while_loop(going, search.newton, varying_as(begin))[1]
+        lost = search.far(at)
+        low, high = -search.most[1], search.most[1]
+        at = jax.lax.while_loop(lambda now: lost & (now[0] < HALVINGS), search.halve, varying_as((0, at, low, high)))[1]
+        return search.ahead(at.roots, at.step(at.missing), 1.0)
 
     def tangent_solve(linear: Callable[[Pair], Pair], value: Pair) -> Pair:
         one, zero = jnp.ones_like(value[0]), jnp.zeros_like(value[0])

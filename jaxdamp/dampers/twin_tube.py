@@ -133,14 +133,15 @@ class TwinTube(AbstractTube):
         largest = at_least(at_least(free[0], free[1]), free[2]) - at_most(at_most(free[0], free[1]), free[2])
         most = self.piston.root(largest), self.base.root(largest)
 
+        first, second = now.roots
+        roots = first, second
         if search:
-            roots = root_of_two(surplus, now.roots, most)
-            return Oil(jnp.stack(self._rates(v, roots)), roots)
-        guess = now.roots
-        for _ in range(2):
-            a, b = newton_of_two(surplus, guess)
-            guess = within(a, -most[0], most[0]), within(b, -most[1], most[1])
-        return Oil(jnp.stack(self._rates(v, guess)), guess)
+            roots = root_of_two(surplus, roots, most)
+        else:
+            for _ in range(2):
+                first, second = newton_of_two(surplus, roots)
+                roots = within(first, -most[0], most[0]), within(second, -most[1], most[1])
+        return Oil(jnp.stack(self._rates(v, roots)), roots)
 
     def incompressible(self) -> AbstractDamper:
         """`piston + base + gas + friction`, the limit B → ∞ without cavities: no states, for sweeps and slow motion."""
