@@ -12,7 +12,6 @@ import typer
 
 from jaxdamp import Ride, _checks, export, sweep, tune
 from jaxdamp._pieces import kept_file
-from jaxdamp.cli.choosing import choose, settings_of
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.controlling import Controlling
 from jaxdamp.cli.jobs import Output, job, write_tables
@@ -22,8 +21,8 @@ from jaxdamp.cli.riding import Driving, beyond_vehicles, unusual
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, read_module, with_law, write_laws
 from jaxdamp.cli.words import Axis
 from jaxdamp.control import Controlled
-from jaxdamp.dampers import AbstractDamper
-from jaxdamp.parameters import match_paths, parameters
+from jaxdamp.dampers import AbstractDamper, Scheduled
+from jaxdamp.parameters import match_paths, modules_inside, named_parameters
 from jaxdamp.report import MOST_POINTS, Table, best_points, sweep_report, tuning_report
 from jaxdamp.roads import WhiteRoad
 from jaxdamp.simulation import stationary_notes
@@ -72,9 +71,9 @@ def tune_command(
     if controlling.controller is not None:
         car = controlling.of(car, law)
         search = replace(search, given={"over": ["policy.**"], **search.given})
-    elif "over" not in search.given and settings_of(car):
-        _choose_setting(screen, car, minimise, surfaces, search, run, output, resume)
-        return
+    elif "over" not in search.given and (settings := _settings(car)):
+        search = replace(search, given={"over": settings, **search.given})
+        screen.points(["Every setting of the law is driven; --over names parameters to tune instead."])
     call, remarks = tuning_arguments(car, minimise, surfaces, search, driving.seed, run)
     screen.points(remarks)
     screen.points(unusual(road, driving.speed), style="yellow")
@@ -86,29 +85,10 @@ def tune_command(
     exit_code_of(result)
 
 
-def _choose_setting(
-    screen: Screen,
-    car: AbstractVehicle,
-    metric: str,
-    surfaces: Sequence[Any],
-    search: Call,
-    run: Mapping[str, Any],
-    output: Output,
-    resume: bool,
-) -> None:
-    """Drive every setting of laws that depend on one, and write the best."""
-    white = isinstance(surfaces[0], WhiteRoad)
-    limits, remarks = _limits(car, metric, search, white=white)
-    screen.points([*remarks, "Every setting of the law is driven; --over names parameters to tune instead."])
-    with job(screen, "tune", output, resume=resume) as work:
-        chosen = choose(screen, car, metric, surfaces, limits, run, white=white)
-        screen.table(chosen.table)
-        screen.say(chosen.verdict, style="bold")
-        with work.saving("Law, vehicle and table") as draft:
-            chosen.write(draft)
-        work.page(chosen.page)
-    if not chosen.met:
-        raise typer.Exit(1)
+def _settings(car: AbstractVehicle) -> dict[str, tune.Choice]:
+    """The settings of laws of several, such as the clicks of a sheet, by the name of the command."""
+    laws = ((path, law) for path, law in modules_inside(car) if isinstance(law, Scheduled))
+    return {f"{path}command": tune.Choice(np.asarray(law.levels)) for path, law in laws}
 
 
 def _realisations(road: str, driving: Driving, count: int) -> tuple[list[Any], dict[str, Any]]:
@@ -147,7 +127,8 @@ def tuned(screen: Screen, call: Mapping[str, Any]) -> TuneResult[Any]:
         result = tune.minimise(**call, progress=lambda step, value: advance(f"step {step}: {value:.5g}", step))
     screen.answer(result.verdict.sentence)
     screen.say(result.summary.removeprefix(result.verdict.sentence).strip())
-    screen.table(result.parameter_table())
+    rows = result.combinations.table() if result.combinations else result.parameter_table()
+    screen.table(rows.first(MOST_POINTS if screen.verbose else ON_SCREEN))
     screen.details(result.table())
     screen.remarks(result.warnings, style="yellow")
     return result
@@ -177,6 +158,8 @@ def write_tuning(folder: Path, result: TuneResult[Any]) -> None:
         tables["scenarios"] = result.scenario_table()
     if result.fresh is not None:
         tables["fresh_roads"] = result.fresh.table()
+    if result.combinations is not None:
+        tables["combinations"] = result.combinations.table()
     write_tables(folder, tables)
     text = json.dumps(result.to_dict(), indent=1, ensure_ascii=False) + "\n"
     (folder / "tuning.json").write_text(text, encoding="utf-8")
@@ -258,7 +241,7 @@ def _comfort_and_grip(car: AbstractVehicle, names: Sequence[str], *, white: bool
 
 def _present(car: AbstractVehicle, over: Mapping[str, np.ndarray]) -> dict[str, float]:
     """The values that the vehicle has of the axes; those left out that stand for several different ones."""
-    known = {p.path: float(p.value) for p in parameters(car) if not np.shape(p.value)}
+    known = {p.path: float(p.value) for p in named_parameters(car, over) if not np.shape(p.value)}
     values = {name: {known[path] for path in match_paths(list(known), [name])} for name in over}
     return {name: value.pop() for name, value in values.items() if len(value) == 1}
 
