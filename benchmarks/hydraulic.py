@@ -105,7 +105,7 @@ def noisy(runs: Sequence[BenchRun], seed: int) -> tuple[list[BenchRun], float]:
     return [dataclasses.replace(run, force=run.force + zero + rng.normal(0.0, NOISE, len(run))) for run in runs], zero
 
 
-def identified(tube: Tube, runs: list[BenchRun], law: AbstractDamper, rig: Rig) -> FitResult:
+def identified(tube: Tube, runs: list[BenchRun], law: AbstractDamper, rig: Rig | None) -> FitResult:
     """Damper and machine from records, from this start."""
     freeze = [*KNOWN, *tube.known]
     return fit(law, runs, rig=rig, priors=PRIORS, starts=1, freeze=freeze, samples_per_cycle=None)
