@@ -4,11 +4,12 @@ import dataclasses
 import functools
 
 import diffrax
+import jax
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from jaxdamp import respond, roads, simulate
+from jaxdamp import _root, respond, roads, simulate
 from jaxdamp.bench import SineTest, VirtualDyno
 from jaxdamp.dampers import Besinger, GasSpring, TwinTube
 from jaxdamp.identify import fit
@@ -78,6 +79,22 @@ def test_against_volumes_of_oil_and_gas(frequency, amplitude, intake):
         found = last_cycle(law, frequency, amplitude, cycles=2, samples=500, substeps=substeps)[2]
         errors.append(np.max(np.abs(found - expected)) / size)
     assert errors[1] < 2e-4 and (errors[1] < errors[0] / 3 or errors[0] < 1e-5), errors
+
+
+@pytest.mark.slow
+def test_flows_from_any_state_by_newton_and_by_halving(monkeypatch):
+    """Far outside of motions too: pressures, velocities and steps of all sizes."""
+    rng, count = np.random.default_rng(0), 300
+    x, v = rng.uniform(-0.18, 0.18, count), rng.normal(size=count) * 10 ** rng.uniform(-4, 0.7, count)
+    states = rng.normal(size=(count, 2)) * 10 ** rng.uniform(-7, -2.5, (count, 2))
+    steps = 10 ** rng.uniform(-5, -1.3, count)
+    after = []
+    for newton_steps in (_root.NEWTON_STEPS, 1):
+        monkeypatch.setattr(_root, "NEWTON_STEPS", newton_steps)
+        after.append(np.asarray(jax.jit(jax.vmap(LAW.implicit_stage))(x, v, states, steps)))
+        assert np.all(np.isfinite(after[-1]))
+    moved = np.abs(after[0] - states).max(axis=1)
+    np.testing.assert_allclose(np.abs(after[0] - after[1]).max(axis=1) / moved, 0.0, atol=1e-7)
 
 
 def test_the_curve_of_paper_001():
