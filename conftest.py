@@ -8,16 +8,21 @@ import contextlib
 import io
 import json
 import os
+import threading
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 import jax
 import numpy as np
+from jax._src.interpreters import mlir
 from sybil import Example, Sybil
 from sybil.evaluators.python import PythonEvaluator
 from sybil.parsers.doctest import DocTestParser
 from sybil.parsers.markdown import CodeBlockParser, PythonCodeBlockParser, SkipParser
 
 
+Context = TypeVar("Context")
 EXAMPLES = Path(__file__).parent / "build" / "examples"
 
 # Most of the time goes into compiling, once for each test: compile quickly instead of for speed. With the variable set,
@@ -31,6 +36,25 @@ os.environ.setdefault("XLA_FLAGS", " ".join(QUICKLY))
 # Without the lines of Python that each operation comes from, which no test reads and which take time.
 jax.config.update("jax_traceback_in_locations_limit", 0)
 jax.config.update("jax_include_full_tracebacks_in_locations", False)
+
+CONTEXT = threading.local()
+PROGRAMS_OF_A_CONTEXT = 50  # each keeps the constants of its programs
+
+
+def _shared(make: Callable[[], Context]) -> Callable[[], Context]:
+    """JAX before 0.12 makes a context of MLIR for each program, which takes milliseconds: make one for several."""
+
+    def context() -> Context:
+        if not getattr(CONTEXT, "left", 0):
+            CONTEXT.current, CONTEXT.left = make(), PROGRAMS_OF_A_CONTEXT
+        CONTEXT.left -= 1
+        return CONTEXT.current
+
+    return context
+
+
+if jax.__version_info__ < (0, 12):
+    mlir.make_ir_context = _shared(mlir.make_ir_context)
 
 
 def _prepare(namespace: dict) -> None:
