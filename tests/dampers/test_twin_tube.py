@@ -80,7 +80,7 @@ def test_against_volumes_of_oil_and_gas(frequency, amplitude, intake):
     assert (np.min(below) == CAVITY) == (intake == "narrow")
     size = np.max(np.abs(expected))
     errors = []
-    for samples in (500, 2000):  # of one length and so one program, whatever the number of cycles; the second is compared
+    for samples in (500, 2000):  # of one length and so one program, whatever the number of cycles; all show the second
         force = respond(law, *_sine(frequency, amplitude, samples), substeps=4)[samples + 1 : 2 * samples + 1]
         errors.append(np.max(np.abs(np.asarray(force)[samples // 500 - 1 :: samples // 500] - expected)) / size)
     assert errors[1] < 2e-4 and (errors[1] < errors[0] / 3 or errors[0] < 1e-5), errors
