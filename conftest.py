@@ -11,18 +11,17 @@ import os
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
 
 import jax
 import numpy as np
 from jax._src.interpreters import mlir
+from jaxlib.mlir import ir
 from sybil import Example, Sybil
 from sybil.evaluators.python import PythonEvaluator
 from sybil.parsers.doctest import DocTestParser
 from sybil.parsers.markdown import CodeBlockParser, PythonCodeBlockParser, SkipParser
 
 
-Context = TypeVar("Context")
 EXAMPLES = Path(__file__).parent / "build" / "examples"
 
 # Most of the time goes into compiling, once for each test: compile quickly instead of for speed. With the variable set,
@@ -41,16 +40,26 @@ CONTEXT = threading.local()
 PROGRAMS_OF_A_CONTEXT = 50  # each keeps the constants of its programs
 
 
-def _shared(make: Callable[[], Context]) -> Callable[[], Context]:
+def _shared(make: Callable[[], ir.Context]) -> Callable[[], ir.Context]:
     """JAX before 0.12 makes a context of MLIR for each program, which takes milliseconds: make one for several."""
 
-    def context() -> Context:
+    def context() -> ir.Context:
+        if _is_in_use():
+            return make()
         if not getattr(CONTEXT, "left", 0):
             CONTEXT.current, CONTEXT.left = make(), PROGRAMS_OF_A_CONTEXT
         CONTEXT.left -= 1
         return CONTEXT.current
 
     return context
+
+
+def _is_in_use() -> bool:
+    """Whether one program is made within another one, which needs a context of its own."""
+    try:
+        return ir.Context.current is not None
+    except ValueError:
+        return False
 
 
 if jax.__version_info__ < (0, 12):
