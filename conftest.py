@@ -32,6 +32,7 @@ QUICKLY = [
     *["--xla_cpu_use_fusion_emitters=false"] * (jax.__version_info__ < (0, 11)),
 ]
 os.environ.setdefault("XLA_FLAGS", " ".join(QUICKLY))
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of workers, as many as cores: more threads wait for one another
 # Without the lines of Python that each operation comes from, which no test reads and which take time.
 jax.config.update("jax_traceback_in_locations_limit", 0)
 jax.config.update("jax_include_full_tracebacks_in_locations", False)
