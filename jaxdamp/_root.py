@@ -7,6 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optimistix as optx
+from jax.extend.core import ClosedJaxpr, jaxpr_as_fun
 from jaxtyping import Array, Bool, PyTree
 
 from jaxdamp._limits import at_most, within
@@ -48,28 +49,32 @@ def increasing_root(
         likely: number of plain Newton steps that are likely to be enough for a good guess; 0 for safe steps only.
         close: relative length of the last step; the remaining error is about its square.
     """
+    closed = jax.make_jaxpr(function)(guess)  # once: it is called by the steps and by each of the derivatives
 
-    def tangent_solve(linear: Callable[[Scalar], Scalar], value: Scalar) -> Scalar:
-        return value * (1.0 / linear(jnp.ones_like(value)))  # a product for each tangent, since quotients are slow
+    def called(w: Scalar, constants: list[Array]) -> Scalar:
+        return jaxpr_as_fun(ClosedJaxpr(closed.jaxpr, constants))(w)[0]
 
-    def solve(f: Callable[[Scalar], Scalar], w: Scalar) -> Scalar:
-        def newton(w: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-            value, slope = jax.jvp(f, (w,), (jnp.ones_like(w),))
-            return value, slope, w - value / jnp.where(slope > 0, slope, 1.0)
+    def newton(w: Scalar, constants: list[Array]) -> tuple[Scalar, Scalar, Scalar]:
+        value, slope = jax.jvp(lambda w: called(w, constants), (w,), (jnp.ones_like(w),))
+        return value, slope, w - value / jnp.where(slope > 0, slope, 1.0)
 
-        def narrow(now: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
-            w, low, high, last, before_last = now
-            value, slope, ahead = newton(w)
-            low = jnp.where(value <= 0, w, low)
-            high = jnp.where(value >= 0, w, high)
-            stalled = jnp.abs(value) > 0.5 * before_last
-            inside = (ahead >= low) & (ahead <= high)
-            # At the root, rounding may lead out of the bracket; a bisection could then be far from the root.
-            small = jnp.abs(ahead - w) <= 1e-6 * (high - low)
-            good = (slope > 0) & (small | (inside & ~stalled))
-            return jnp.where(good, ahead, 0.5 * (low + high)), low, high, jnp.abs(value), last
+    def safe_step(constants: list[Array], now: tuple[Scalar, ...]) -> tuple[Scalar, tuple[Scalar, ...]]:
+        w, low, high, last, before_last = now
+        value, slope, ahead = newton(w, constants)
+        low = jnp.where(value <= 0, w, low)
+        high = jnp.where(value >= 0, w, high)
+        stalled = jnp.abs(value) > 0.5 * before_last
+        inside = (ahead >= low) & (ahead <= high)
+        # At the root, rounding may lead out of the bracket; a bisection could then be far from the root.
+        small = jnp.abs(ahead - w) <= 1e-6 * (high - low)
+        good = (slope > 0) & (small | (inside & ~stalled))
+        return jnp.where(good, ahead, 0.5 * (low + high)), (low, high, jnp.abs(value), last)
 
-        low, high = jax.lax.stop_gradient((lower, upper))
+    # Its own root to the derivatives: second ones in reverse mode come here, see `jaxdamp._elementary`.
+    differentiable_step = _implicit_root(called, safe_step)
+
+    def solved(constants: list[Array], bracket: tuple[Scalar, ...]) -> tuple[Scalar, tuple[()]]:
+        w, low, high = bracket
         never = jnp.full_like(w, jnp.inf)
         near = 1e-16 * (high - low)
 
@@ -81,24 +86,41 @@ def increasing_root(
             return still_moving & (count < steps)
 
         def again(now: PyTree) -> PyTree:
-            count, _, (w, *others) = now
-
-            def safe_step(_: Callable[[Scalar], Scalar], w: Scalar) -> tuple[Scalar, tuple[Scalar, ...]]:
-                after, *rest = narrow((w, *others))
-                return after, tuple(rest)
-
-            # Its own root to the derivatives: second ones in reverse mode come here, see `jaxdamp._elementary`.
-            after, rest = jax.lax.custom_root(f, w, safe_step, tangent_solve, has_aux=True)
-            return count + 1, moved(w, after), (after, *rest)
+            count, _, before = now
+            after, rest = differentiable_step(constants, before)
+            return count + 1, moved(before[0], after), (after, *rest)
 
         start = jnp.ones_like(w, bool)
         for _ in range(likely if target().fused_loops else 0):  # written out they are fast, but take longer to compile
-            before, w = w, jnp.clip(newton(w)[2], low, high)
+            before, w = w, jnp.clip(newton(w, constants)[2], low, high)
             start = moved(before, w)
         begin = varying_as((0, start, (w, low, high, never, never)))
-        return jax.lax.while_loop(going, again, begin)[2][0]
+        return jax.lax.while_loop(going, again, begin)[2][0], ()
 
-    return jax.lax.custom_root(function, jax.lax.stop_gradient(guess), solve, tangent_solve)
+    return _implicit_root(called, solved)(closed.consts, jax.lax.stop_gradient((guess, lower, upper)))[0]
+
+
+def _implicit_root(
+    function: Callable[[Scalar, list[Array]], Scalar],
+    solve: Callable[[list[Array], tuple[Scalar, ...]], tuple[Scalar, tuple[Scalar, ...]]],
+) -> Callable[[list[Array], tuple[Scalar, ...]], tuple[Scalar, tuple[Scalar, ...]]]:
+    """A solver of function(w, c) = 0 with ∂w/∂c = −(∂f/∂c)/(∂f/∂w), and none by where it starts.
+
+    As `jax.lax.custom_root`, which traces the function five times, also where nothing is differentiated: a root inside
+    the function of another one is then traced 25 times.
+    """
+    root = jax.custom_jvp(solve)
+
+    @root.defjvp
+    def _(primals: PyTree, tangents: PyTree) -> PyTree:
+        constants, begin = primals
+        w, others = root(constants, begin)
+        _, change = jax.jvp(lambda constants: function(w, constants), (constants,), (tangents[0],))
+        _, slope = jax.jvp(lambda w: function(w, constants), (w,), (jnp.ones_like(w),))
+        # a product for each tangent, since quotients are slow
+        return (w, others), (-(change * (1.0 / slope)), jax.tree.map(jnp.zeros_like, others))
+
+    return root
 
 
 Pair = tuple[Scalar, Scalar]
