@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp.bench.motion import cycle_instants, moving_span
+from jaxdamp.bench.motion import moving_span
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import as_runs
 
@@ -95,7 +95,7 @@ def moving_part(run: BenchRun) -> slice:
     Arguments:
         run: a record.
     """
-    first, last = moving_span(run.time, run.stroke)
+    first, last = moving_span(run.time, run.stroke, run.frequency)
     return slice(first, last + 1)
 
 
@@ -184,7 +184,7 @@ def _samples(run: BenchRun, start: float, stop: float) -> slice:
 
 def _steady_instants(run: BenchRun) -> list[tuple[float, float]]:
     """Start and end [s] of each steady cycle."""
-    cycles = list(itertools.pairwise(cycle_instants(run.time, run.stroke).tolist()))
+    cycles = list(itertools.pairwise(run.cycle_instants.tolist()))
     if not cycles:
         return []
     ranges = np.array([np.ptp(run.stroke[_samples(run, *ends)]) for ends in cycles])

@@ -46,7 +46,11 @@ def dominant_frequency(time: Samples, stroke: Samples) -> float:
     Rest before and after the motion does not count. Where no direction is passed twice it is the highest line of the
     spectrum.
     """
-    periods = np.concatenate([np.diff(instants) for instants in crossings(time, stroke)])
+    return _frequency(time, stroke, crossings(time, stroke))
+
+
+def _frequency(time: Samples, stroke: Samples, passages: tuple[np.ndarray, np.ndarray]) -> float:
+    periods = np.concatenate([np.diff(instants) for instants in passages])
     if len(periods):
         return float(1 / np.median(periods))
     x, step = stroke - np.mean(stroke), (time[-1] - time[0]) / (len(time) - 1)
@@ -60,8 +64,9 @@ def cycle_instants(time: Samples, stroke: Samples) -> Float[np.ndarray, " instan
     Cycles begin where the stroke passes its middle upwards, or downwards if that gives more of them. A record that
     begins or ends in the middle of the stroke has a full cycle before the first or behind the last passage too.
     """
-    period = 1 / dominant_frequency(time, stroke)
-    return max((extended(time, stroke, instants, period) for instants in crossings(time, stroke)), key=len)
+    passages = crossings(time, stroke)
+    period = 1 / _frequency(time, stroke, passages)
+    return max((extended(time, stroke, instants, period) for instants in passages), key=len)
 
 
 def extended(
@@ -78,9 +83,9 @@ def extended(
     return np.concatenate([before, instants, behind])
 
 
-def motion_amplitude(time: Samples, stroke: Samples) -> float:
+def motion_amplitude(time: Samples, stroke: Samples, frequency: float) -> float:
     """Half the range of the stroke [m], zero to peak; noise faster than a twentieth of a period is smoothed."""
-    window = round((len(time) - 1) / (time[-1] - time[0]) / dominant_frequency(time, stroke) / 20)
+    window = round((len(time) - 1) / (time[-1] - time[0]) / frequency / 20)
     window = min(window, len(stroke) - 1) // 2 * 2 + 1
     if window > 5:
         from scipy.signal import savgol_filter  # takes a second to import, and not every record needs it
@@ -89,22 +94,24 @@ def motion_amplitude(time: Samples, stroke: Samples) -> float:
     return float(np.max(stroke) - np.min(stroke)) / 2
 
 
-def cycle_works(time: Samples, stroke: Samples, power: Samples) -> Float[np.ndarray, " cycles"]:
-    """Work [J] of every full cycle, from the power F v [W]."""
+def cycle_works(
+    time: Samples, power: Samples, instants: Float[np.ndarray, " instants"]
+) -> Float[np.ndarray, " cycles"]:
+    """Work [J] of every full cycle, from the power F v [W] and the `cycle_instants`."""
     step = (time[-1] - time[0]) / (len(time) - 1)
     work = np.concatenate([[0.0], np.cumsum((power[1:] + power[:-1]) / 2) * step])
     work = np.concatenate([work, [work[-1] + 2 * step * power[-1]]])  # the last cycle may end behind the last sample
-    return np.diff(np.interp(cycle_instants(time, stroke), np.append(time, time[-1] + 2 * step), work))
+    return np.diff(np.interp(instants, np.append(time, time[-1] + 2 * step), work))
 
 
-def moving_span(time: Samples, stroke: Samples) -> tuple[int, int]:
+def moving_span(time: Samples, stroke: Samples, frequency: float) -> tuple[int, int]:
     """First and last sample of the motion, without the rest before and after it.
 
     A record rests where, from its first sample on, the stroke stays for a quarter of a period or longer within 1 % of
     the amplitude, or within the noise if that is more, of where it is then; and likewise at its end. A fiftieth of a
     period beyond the motion is left, so that its first and last cycle are whole.
     """
-    quarter = max(round(0.25 / dominant_frequency(time, stroke) * (len(time) - 1) / (time[-1] - time[0])), 2)
+    quarter = max(round(0.25 / frequency * (len(time) - 1) / (time[-1] - time[0])), 2)
     tolerance = max(0.005 * float(np.ptp(stroke)), 5.0 * white_noise(stroke))
 
     def rest(x: Samples) -> int:

@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._traced import of_known_numbers
-from jaxdamp.bench.motion import Samples, cycle_instants, moving_span
+from jaxdamp.bench.motion import Samples, moving_span
 
 
 if TYPE_CHECKING:
@@ -183,7 +183,7 @@ def cut_between(run: "BenchRun", start: float | int, stop: float | int) -> "Benc
 
 
 def _cut_rest(run: "BenchRun") -> "BenchRun":
-    first, last = moving_span(run.time, run.stroke)
+    first, last = moving_span(run.time, run.stroke, run.frequency)
     before, after = run.time[first] - run.time[0], run.time[-1] - run.time[last]
     if not before and not after:
         return run
@@ -200,7 +200,7 @@ def choose_cycles(run: "BenchRun", skip: int, last: int | None) -> "BenchRun":
     if last is not None and not 1 <= last <= most:
         must = f"be between 1 and the number of full cycles, {most}"
         _checks.refuse("last_cycles", must, f"{last} for {run.name!r}")
-    instants, half = cycle_instants(run.time, run.stroke), 0.5 / run.sampling_rate
+    instants, half = run.cycle_instants, 0.5 / run.sampling_rate
     first = count - last if last is not None else skip
     start, stop = instants[first] - half, instants[-1] - half
     part = (run.time >= start) & (run.time < stop)

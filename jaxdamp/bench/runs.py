@@ -189,12 +189,17 @@ class BenchRun:
     @cached_property
     def amplitude(self) -> float:
         """Half the range of the stroke [m], zero to peak, smoothed over a twentieth of a period."""
-        return motion_amplitude(self.time, self.stroke)
+        return motion_amplitude(self.time, self.stroke, self.frequency)
 
     @cached_property
     def cycles(self) -> int:
         """Number of full cycles, from one passage of mid-stroke to the next in the same direction."""
-        return max(len(cycle_instants(self.time, self.stroke)) - 1, 0)
+        return max(len(self.cycle_instants) - 1, 0)
+
+    @cached_property
+    def cycle_instants(self) -> Float[np.ndarray, " instants"]:
+        """Instants [s] at which full cycles begin and, last, at which the last one ends."""
+        return cycle_instants(self.time, self.stroke)
 
     @property
     def peak_velocity(self) -> float:
@@ -212,7 +217,7 @@ class BenchRun:
 
         The median leaves the first and last cycles, in which a machine runs up and down, without influence.
         """
-        works = cycle_works(self.time, self.stroke, self.force * self.velocity)
+        works = cycle_works(self.time, self.force * self.velocity, self.cycle_instants)
         return float(np.median(works)) if len(works) else self.dissipated_energy
 
     @property

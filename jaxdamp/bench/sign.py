@@ -46,7 +46,7 @@ def loss_fraction(time: Samples, stroke: Samples, force: Samples) -> tuple[float
     instants, power = cycle_instants(time, stroke), force * np.gradient(stroke, time)
     part = np.ones(len(time), dtype=bool)
     if len(instants) > 1:
-        work, part = float(np.median(cycle_works(time, stroke, power))), (time >= instants[0]) & (time < instants[-1])
+        work, part = float(np.median(cycle_works(time, power, instants))), (time >= instants[0]) & (time < instants[-1])
     else:
         work = float(np.trapezoid(power, time))
     scale = 2 * np.pi * float(np.std(force[part]) * np.std(stroke[part]))

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from jaxdamp.bench.analysis import FoldedCycles
 from jaxdamp.bench.motion import Samples
@@ -74,8 +74,9 @@ def _late_in_few_cycles(e: Examined, cycles: FoldedCycles) -> list[Finding]:
     """
     force = cycles.force
     (count, points), noise = force.shape, e.noise["force"] ** 2
-    places = range(points // 2, force.size - points // 2 + 1, max(points // _PLACES, 1))
-    left, at = min((_sides(force, place).left, place) for place in places)
+    places = np.arange(points // 2, force.size - points // 2 + 1, max(points // _PLACES, 1))
+    squares = _squares(force, places)
+    left, at = float(squares.min()), int(places[squares.argmin()])
     sides, about_mean = _sides(force, at), float(np.sum((force - force.mean(axis=0)) ** 2))
     degrees = (count - 1) * points
     above = about_mean - noise * degrees
@@ -100,16 +101,24 @@ class _Sides(NamedTuple):
     other: Samples
     there: np.ndarray  # where the other is known
     full_first: bool
-    left: float  # squares about both
+
+
+def _squares(force: Float[np.ndarray, "cycles points"], places: Int[np.ndarray, " places"]) -> np.ndarray:
+    """Squares about the mean cycles before and behind each of several places."""
+    (count, points), centred = force.shape, force - force.mean()
+    sums, squares = (np.pad(np.cumsum(part, axis=0), ((1, 0), (0, 0))) for part in (centred, centred**2))
+    point = np.arange(points)
+    before = np.clip((places[:, None] - point + points - 1) // points, 0, count)
+    means = (sums[before, point] ** 2 / np.maximum(before, 1), (sums[-1] - sums[before, point]) ** 2)
+    return np.sum(squares[-1] - means[0] - means[1] / np.maximum(count - before, 1), axis=1)
 
 
 def _sides(force: Float[np.ndarray, "cycles points"], at: int) -> _Sides:
     before = (np.arange(force.size) < at).reshape(force.shape)
     counts = [part.sum(axis=0) for part in (before, ~before)]
     means = [np.sum(force * part, axis=0) / np.maximum(n, 1) for part, n in zip((before, ~before), counts, strict=True)]
-    left = float(np.sum((force - np.where(before, *means)) ** 2))
     first = bool(counts[0].min() > 0)
-    return _Sides(means[1 - first], means[first], counts[first] > 0, first, left)
+    return _Sides(means[1 - first], means[first], counts[first] > 0, first)
 
 
 def _least_delay(e: Examined) -> float:

@@ -71,7 +71,7 @@ class Examined:
 
     def __init__(self, run: BenchRun) -> None:
         self.run = run
-        first, last = moving_span(run.time, run.stroke)
+        first, last = moving_span(run.time, run.stroke, run.frequency)
         self.moving = slice(first, last + 1)
 
     @cached_property
