@@ -23,7 +23,7 @@ from jaxdamp._tables import Column, Table  # noqa: E402
 
 
 CURRENTS = {"*_0A": 0.0, "*_0.5A": 0.5, "*_1.0A": 1.0}
-SEARCH = {"samples_per_cycle": 100, "max_steps": 30, "starts": 1}
+SEARCH: dict[str, Any] = {"samples_per_cycle": 100, "max_steps": 30, "starts": 1}
 PARTS = ("moving", "whole", "estimated")
 CREEPING = "creeping_visco_plastic_spring"
 LAWS = ["lugre_spring", "visco_plastic_spring", "thinned_visco_plastic", CREEPING]
