@@ -15,7 +15,7 @@ from jaxdamp._pieces import piece
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Compared, Table, comparison_table, plain
 from jaxdamp._types import Scalar
-from jaxdamp.metrics import Metric, power_spectral_density
+from jaxdamp.metrics import Metric
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride, simulate
 from jaxdamp.tune.limits import LimitRange
@@ -58,6 +58,8 @@ def spectra(
         gains = frequency_response(linear, frequency, speed=road.speed)
         height = 2.0 * float(road.velocity_psd) / (2.0 * np.pi * frequency) ** 2
         return {name: Spectrum(frequency, np.abs(np.asarray(gains[name])) ** 2 * height) for name in channels}
+    from scipy.signal import welch  # `power_spectral_density` is compiled anew for each length
+
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the notes of the tuning say it
         response = simulate(vehicle, road, **run)
@@ -66,7 +68,7 @@ def spectra(
     for name in channels:
         values = np.asarray(response[name])
         segment = min(round(1.2 / (LOWEST * dt)), len(values))
-        frequency, density = (np.asarray(a) for a in power_spectral_density(values - values.mean(), dt, segment))
+        frequency, density = welch(values, 1.0 / dt, nperseg=segment)
         inside = (frequency >= LOWEST) & (frequency <= HIGHEST)
         by_channel[name] = Spectrum(frequency[inside], density[inside])
     return by_channel
