@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks, metrics
 from jaxdamp._tables import Compared, Table, comparison_table, percent_change
@@ -139,13 +139,15 @@ def _weighted(response: "Response", channel: str, weighting: str, dt: ScalarLike
 
 def _at_rest(run: "Response") -> tuple[Scalar, ...]:
     """The channels in the static equilibrium on the first heights of a run, forces left out."""
-    return run.remembered("at rest", lambda: _channels_at_rest(run.system, run.road))
+    known = _checks.concrete(run.road)
+    first = run.road[0] if known is None else known[0]
+    return run.remembered("at rest", lambda: _channels_at_rest(run.system, first))
 
 
 @eqx.filter_jit
-def _channels_at_rest(system: System, road: Float[Array, "time wheels"]) -> tuple[Scalar, ...]:
-    force = jnp.zeros(system.outputs.force.shape[1])
-    return tuple(system.outputs(settled(system, road[0]), force, road[0], None))
+def _channels_at_rest(system: System, road: Float[ArrayLike, " wheels"]) -> tuple[Scalar, ...]:
+    height = jnp.asarray(road)
+    return tuple(system.outputs(settled(system, height), jnp.zeros(system.outputs.force.shape[1]), height, None))
 
 
 if TYPE_CHECKING:
