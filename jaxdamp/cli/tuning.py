@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from jaxdamp import Ride, _checks, export, sweep, tune
+from jaxdamp import Ride, _checks, export, tune
 from jaxdamp._pieces import kept_file
 from jaxdamp.cli.choosing import choose, settings_of
 from jaxdamp.cli.console import Screen
@@ -27,7 +27,6 @@ from jaxdamp.parameters import match_paths, parameters
 from jaxdamp.report import MOST_POINTS, Table, best_points, sweep_report, tuning_report
 from jaxdamp.roads import WhiteRoad
 from jaxdamp.simulation import stationary_notes
-from jaxdamp.sweeps import without_effect
 from jaxdamp.tune import Status, TuneResult, limit_spans
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -206,6 +205,8 @@ def sweep_command(
         limit: limits.
         baseline: to compare with: another law, or another tuning's vehicle.json, as JSON.
     """
+    from jaxdamp.sweeps import sweep, without_effect  # with xarray and pandas, which other commands do without
+
     car = parse_vehicle(vehicle)(None if start is None else read_law("start", start))
     (surface,), run = driving.over(road)
     white = isinstance(surface, WhiteRoad)
