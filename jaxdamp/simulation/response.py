@@ -63,6 +63,12 @@ def _channel(
     return jax.vmap(row)(motion, port_force, road, road_rate)[:, 0]
 
 
+@jax.jit(static_argnames="part")
+def _rows(arrays: dict[str, Array], part: tuple[int, int]) -> dict[str, Array]:
+    """The rows from one to another of each array."""
+    return {name: array[slice(*part)] for name, array in arrays.items()}
+
+
 @final
 class Response(eqx.Module, AbstractResult):
     """The response of a vehicle to a road, at uniformly spaced instants.
@@ -213,10 +219,12 @@ class Response(eqx.Module, AbstractResult):
         if start < time[0] - slack or stop > time[-1] + slack or inside.size < 2:
             must = f"be two instants or more of the run, {time[0]:g} to {time[-1]:g} s"
             _checks.refuse("start, stop", must, f"{start:g} and {stop:g}")
-        part, last = slice(inside[0], inside[-1] + 1), inside[-1] + 1 == time.size
+        part, last = (int(inside[0]), int(inside[-1]) + 1), inside[-1] + 1 == time.size
+        if part == (0, time.size):
+            return self
         states = [state if last else jnp.full_like(state, jnp.nan) for state in self.final_state]
         names = ("time", "motion", "port_force", "road", "road_rate", "commands")
-        arrays = {name: values[part] for name in names if (values := getattr(self, name)) is not None}
+        arrays = _rows({name: values for name in names if (values := getattr(self, name)) is not None}, part)
         begin = jnp.asarray(inside[0] + (0 if self.begin is None else self.begin))
         return dataclasses.replace(self, **arrays, final_state=states, whole=self.run, begin=begin)
 

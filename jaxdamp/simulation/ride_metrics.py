@@ -132,9 +132,12 @@ def _weighted(response: "Response", channel: str, weighting: str, dt: ScalarLike
         if response.begin is None:
             return metrics.weighted_signal(response[channel], dt, weighting, method="step", remove_mean=False)
         whole = _weighted(response.run, channel, weighting, dt)
-        return jax.lax.dynamic_slice_in_dim(whole, response.begin, response.time.size)
+        return _cut(whole, response.begin, response.time.size)
 
     return response.remembered((channel, weighting), made)
+
+
+_cut = jax.jit(jax.lax.dynamic_slice_in_dim, static_argnums=2)  # in one program
 
 
 def _at_rest(run: "Response") -> tuple[Scalar, ...]:

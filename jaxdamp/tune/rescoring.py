@@ -63,7 +63,7 @@ def spectra(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the notes of the tuning say it
         response = simulate(vehicle, road, **run)
-    dt = float(response.time[1] - response.time[0])
+    dt = float(np.diff(np.asarray(response.time))[0])
     by_channel = {}
     for name in channels:
         values = np.asarray(response[name])
