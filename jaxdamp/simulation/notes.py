@@ -70,8 +70,9 @@ def range_uses(
     if not has_fitted_range(vehicle) or any(_checks.concrete(leaf) is None for leaf in jax.tree.leaves(tree)):
         return {}
     form, motion, road, road_rate, forces = jax.tree.map(np.asarray, (form, motion, road, road_rate, port_force))
-    position, rate = np.split(motion, 2, axis=1)
-    strokes, velocities = (np.asarray(form.at_ports(*at)) for at in ((position, road), (rate, road_rate)))
+    count = motion.shape[1] // 2
+    pairs = (motion[:, :count], road), (motion[:, count:], road_rate)
+    strokes, velocities = (np.asarray(form.at_ports(*pair)) for pair in pairs)
     uses_of = {}
     for i, (name, law) in enumerate(named_laws(vehicle).items()):
         uses = range_use(law, Motion(strokes[:, i], velocities[:, i], forces[:, i]))
