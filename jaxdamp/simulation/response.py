@@ -10,7 +10,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float, Int, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._guesses import Elsewhere
@@ -38,7 +38,7 @@ T = TypeVar("T")
 
 
 @jax.tree_util.register_pytree_node_class
-class _Remembered(dict[Hashable, Any]):
+class _Remembered(dict[Hashable, PyTree]):
     """What was computed of one response. It holds no leaf: another response begins without any."""
 
     def tree_flatten(self) -> tuple[tuple[()], None]:

@@ -247,7 +247,7 @@ def _on_fresh_roads(
     task, cars = evaluator.task, (evaluator.task.vehicle, tuned)
     designs = np.stack([task.space.start, values])
 
-    def by_search(road: Any) -> list[dict[str, float]]:
+    def by_search(road: Road | Scenarios) -> list[dict[str, float]]:
         ride = ride_on(task.vehicle, road, task.objective, task.run)
         return [task.numbers(row) for row in evaluator.program.at(designs, ride).values]
 

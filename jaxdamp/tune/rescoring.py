@@ -21,7 +21,7 @@ from jaxdamp.simulation import Ride, simulate
 from jaxdamp.tune.limits import LimitRange
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.scenario_ride import exact
-from jaxdamp.tune.scenarios import Scenarios
+from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import RUN, Run, completed
 from jaxdamp.tune.verdict import decided, half_interval
 from jaxdamp.vehicles import AbstractVehicle, frequency_response, linearise
@@ -211,7 +211,9 @@ def rescore(
     return rescored(drive, roads, units, result.metric)
 
 
-Driver: TypeAlias = Callable[[Any], Sequence[Mapping[str, Scalar | float]]]  # on a road, the vehicle before and after
+Driver: TypeAlias = Callable[
+    [Road | Scenarios], Sequence[Mapping[str, Scalar | float]]
+]  # on a road, the vehicle before and after
 
 
 def driver(
@@ -222,7 +224,7 @@ def driver(
 ) -> Driver:
     """The metrics of two vehicles on a road or in scenarios."""
 
-    def drive(car: AbstractVehicle, road: Any) -> Mapping[str, Scalar]:
+    def drive(car: AbstractVehicle, road: Road | Scenarios) -> Mapping[str, Scalar]:
         if isinstance(road, Scenarios):
             ride = road.ride(car, metrics=metrics, **run)
             each = objective.of_each(ride.each()) if objective else ride.each()
