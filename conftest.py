@@ -8,10 +8,14 @@ import contextlib
 import io
 import json
 import os
+import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import jax
 import numpy as np
+from jax._src.interpreters import mlir
+from jaxlib.mlir import ir
 from sybil import Example, Sybil
 from sybil.evaluators.python import PythonEvaluator
 from sybil.parsers.doctest import DocTestParser
@@ -28,9 +32,39 @@ QUICKLY = [
     *["--xla_cpu_use_fusion_emitters=false"] * (jax.__version_info__ < (0, 11)),
 ]
 os.environ.setdefault("XLA_FLAGS", " ".join(QUICKLY))
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of workers, as many as cores: more threads wait for one another
 # Without the lines of Python that each operation comes from, which no test reads and which take time.
 jax.config.update("jax_traceback_in_locations_limit", 0)
 jax.config.update("jax_include_full_tracebacks_in_locations", False)
+
+CONTEXT = threading.local()
+PROGRAMS_OF_A_CONTEXT = 50  # each keeps the constants of its programs
+
+
+def _shared(make: Callable[[], ir.Context]) -> Callable[[], ir.Context]:
+    """JAX before 0.12 makes a context of MLIR for each program, which takes milliseconds: make one for several."""
+
+    def context() -> ir.Context:
+        if _is_in_use():
+            return make()
+        if not getattr(CONTEXT, "left", 0):
+            CONTEXT.current, CONTEXT.left = make(), PROGRAMS_OF_A_CONTEXT
+        CONTEXT.left -= 1
+        return CONTEXT.current
+
+    return context
+
+
+def _is_in_use() -> bool:
+    """Whether one program is made within another one, which needs a context of its own."""
+    try:
+        return ir.Context.current is not None
+    except ValueError:
+        return False
+
+
+if jax.__version_info__ < (0, 12):
+    mlir.make_ir_context = _shared(mlir.make_ir_context)
 
 
 def _prepare(namespace: dict) -> None:

@@ -3,6 +3,7 @@
 JAX is imported where numbers are checked, so that a command which refuses a path need not wait for it.
 """
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -188,6 +189,20 @@ def counts(**values: int | None) -> None:
     for argument, value in values.items():
         if value is not None and value < 1:
             refuse(argument, "be 1 or more", value)
+
+
+def part_of(argument: str, text: str) -> tuple[int, int]:
+    """The number of a part, and of how many.
+
+    >>> part_of("block", "17/200")
+    (17, 200)
+    """
+    match = re.fullmatch(r"\s*(\d+)\s*/\s*(\d+)\s*", text)
+    part, parts = map(int, match.groups()) if match else (0, 0)
+    if not 1 <= part <= parts:
+        remedy = "Number the parts from 1: in an array job of 4, '1/4' to '4/4'."
+        refuse(argument, "be a part such as '1/4'", repr(text), remedy)
+    return part, parts
 
 
 def one_of(argument: str, value: str, choices: Iterable[str]) -> None:

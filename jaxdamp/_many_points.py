@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxdamp.parameters import Domain, get, match_paths, parameters
+from jaxdamp.parameters import Domain, get, match_paths, named_parameters
 
 
 Columns = Mapping[str, np.ndarray]
@@ -31,7 +31,7 @@ def outside_domains(tree: PyTree, columns: Columns) -> np.ndarray:
     >>> print(*outside_domains(Linear(1500.0), {"rate": np.array([-1.0, 2000.0])}), sep=";")
     rate must be positive [N s/m];
     """
-    known = {p.path: p for p in parameters(tree)}
+    known = {p.path: p for p in named_parameters(tree, columns)}
     named = {path: np.asarray(column) for name, column in columns.items() for path in match_paths([*known], [name])}
     by_path = {path: column for path, column in named.items() if known[path].value.ndim == 0}
     reasons = np.full(len(next(iter(named.values()))), "", dtype=object)
@@ -64,8 +64,9 @@ def _above(path: str) -> list[str]:
 def _domains_by_value(module: PyTree) -> dict[str, Any]:
     """The domains that are functions of the module, by field."""
     fields = dataclasses.fields(module) if dataclasses.is_dataclass(module) else ()
-    declared = {field.name: field.metadata.get("parameter", {}).get("domain") for field in fields}
-    return {name: domain for name, domain in declared.items() if callable(domain) and not isinstance(domain, Domain)}
+    declared = {f.name: f.metadata.get("parameter") or f.metadata.get("setting") or {} for f in fields}
+    domains = {name: has.get("domain") for name, has in declared.items()}
+    return {name: domain for name, domain in domains.items() if callable(domain) and not isinstance(domain, Domain)}
 
 
 def _judge_together(module: PyTree, start: str, below: Columns, reasons: np.ndarray) -> None:

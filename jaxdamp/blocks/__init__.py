@@ -6,7 +6,9 @@ from jaxdamp.blocks.store import (
     AbstractStore as AbstractStore,
     BlockStore as BlockStore,
     Variable as Variable,
+    command_of as command_of,
     import_zarr as import_zarr,
+    note_command as note_command,
     stored_blocks as stored_blocks,
 )
 

@@ -7,7 +7,6 @@ import os
 import pickle
 import platform
 import queue
-import re
 import threading
 import time
 import warnings
@@ -69,27 +68,6 @@ class _Job(NamedTuple):
     double: bool  # precision
 
 
-def run_blocks(work: AbstractWork, store: AbstractStore, cluster: Cluster, on_block: Callable[[int], None]) -> None:
-    """Compute and write the blocks that are not done.
-
-    Arguments:
-        work: computes the points.
-        store: takes the blocks.
-        cluster: a `concurrent.futures.Executor`, a Dask `Client`, "k/n" for the k-th of n parts of the blocks in this
-            process, or None for all of them in this process.
-        on_block: called with the number of points of every block that was written.
-    """
-    left = [int(number) for number in store.left()]
-    if cluster is not None and not isinstance(cluster, str):
-        if left:
-            _by_workers(work, store, _Workers(cluster, work, store.blocks.indices(left[0])), left, on_block)
-        return
-    for number in left if cluster is None else _part(cluster, left):
-        indices = store.blocks.indices(number)
-        store.write(number, work.compute(indices))
-        on_block(indices.size)
-
-
 def fill(
     store: AbstractStore,
     work: AbstractWork,
@@ -103,28 +81,38 @@ def fill(
     Arguments:
         store: takes the blocks.
         work: computes the points.
-        cluster: as in `run_blocks`.
-        progress: called with the number of points done and of all points; a line in the terminal if None.
+        cluster: a `concurrent.futures.Executor`, a Dask `Client`, "k/n" for the k-th of n parts of the blocks in this
+            process, or None for all of them in this process.
+        progress: called with the number of points done and of all points, of a part with "k/n"; a line in the terminal
+            if None.
         doing: in a word, such as "Sweeping".
         what: the points are.
     """
-    damaged = store.repair()
+    part, parts = _checks.part_of("cluster", cluster) if isinstance(cluster, str) else (1, 1)
+    own = range(part - 1, store.blocks.count, parts)
+    damaged = store.repair(own)
     if damaged:
         warnings.warn(
             f"{damaged} blocks in {store.path} were damaged on the disk, and are computed anew.", stacklevel=5
         )
-    total = int(np.prod(store.blocks.shape))
-    left = sum(store.blocks.size(int(number)) for number in store.left())
-    done, start = total - left, time.monotonic()
+    left = [int(number) for number in store.left() if number in own]
+    total, missing = (sum(map(store.blocks.size, numbers)) for numbers in (own, left))
+    done, start = total - missing, time.monotonic()
     with Progress(doing) as shown:
 
         def on_block(points: int) -> None:
             nonlocal done
             done += points
-            rate = (done - total + left) / max(time.monotonic() - start, 1e-9)
+            rate = (done - total + missing) / max(time.monotonic() - start, 1e-9)
             tell(progress, shown, done, total, rate, what)
 
-        run_blocks(work, store, cluster, on_block)
+        if cluster is None or isinstance(cluster, str):
+            for number in left:
+                indices = store.blocks.indices(number)
+                store.write(number, work.compute(indices))
+                on_block(indices.size)
+        elif left:
+            _by_workers(work, store, _Workers(cluster, work, store.blocks.indices(left[0])), left, on_block)
 
 
 @final
@@ -257,16 +245,6 @@ def _child() -> Executor:
     from multiprocessing import get_context
 
     return ProcessPoolExecutor(1, get_context("spawn"))
-
-
-def _part(text: str, left: list[int]) -> list[int]:
-    """The blocks of one part of so many, of those that are left."""
-    match = re.fullmatch(r"\s*(\d+)\s*/\s*(\d+)\s*", text)
-    part, parts = map(int, match.groups()) if match else (0, 0)
-    if not 1 <= part <= parts:
-        remedy = "Number the parts from 1: in an array job of 4, '1/4' to '4/4'."
-        _checks.refuse("cluster", "be a part such as '1/4'", repr(text), remedy)
-    return [number for number in left if number % parts == part - 1]
 
 
 @functools.cache

@@ -6,7 +6,7 @@ import os
 import shutil
 import tempfile
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, NamedTuple, final
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import zarr
 
 
-IDENTITY = "jaxdamp"  # attribute: what the store belongs to
+IDENTITY, COMMAND = "jaxdamp", "jaxdamp_command"  # attributes: what the store belongs to, and what filled it, in words
 DONE = "done"  # variable along `BLOCK`: how many points of a block failed, negative before it is computed
 BLOCK = "jaxdamp_block"
 FAILURES = ("failed", "reason")  # variables that say where and why there is no result
@@ -59,8 +59,8 @@ class AbstractStore(ABC):
         """The blocks that are not done."""
 
     @abstractmethod
-    def repair(self) -> int:
-        """Blocks that are not as they were written are not done; gives how many."""
+    def repair(self, numbers: Iterable[int]) -> int:
+        """Those of some blocks that are not as they were written are not done; gives how many."""
 
     @abstractmethod
     def write(self, number: int, values: Mapping[str, np.ndarray]) -> None:
@@ -186,16 +186,18 @@ class BlockStore(AbstractStore):
             stored = json.loads(import_zarr().open_group(self.path, mode="r").attrs[IDENTITY])
         except Exception as error:
             remedy = "Choose another name, or delete the folder."
-            raise ValueError(f"Argument `file`: {self.path} is no store of jaxdamp's ({error!r}). {remedy}") from error
+            message = f"Argument `file`: {self.path} is no store of jaxdamp's ({error!r}). {remedy}"
+            raise _checks.ArgumentError(message, argument="file") from error
         differences = [
             f"{name} is {stored.get(name)} there, {self._identity.get(name)} now"
             for name in {**self._identity, **stored}
             if stored.get(name) != self._identity.get(name)
         ]
         if differences:
-            raise ValueError(
+            raise _checks.ArgumentError(
                 f"Argument `file`: {self.path} holds other work: {'; '.join(differences)}. Choose another name, or "
-                "delete the folder to begin anew."
+                "delete the folder to begin anew.",
+                argument="file",
             )
 
     def left(self) -> np.ndarray:
@@ -205,10 +207,10 @@ class BlockStore(AbstractStore):
     def _marks(self) -> np.ndarray:
         return np.asarray(import_zarr().open_group(self.path, mode="r")[DONE][:])
 
-    def repair(self) -> int:
-        """Read every block that is marked; those that are not as they were written are not done. Returns how many."""
+    def repair(self, numbers: Iterable[int]) -> int:
+        """Read those of some blocks that are marked; what is not as it was written is not done. Returns how many."""
         group, damaged = import_zarr().open_group(self.path, mode="r+"), 0
-        for number in range(self.blocks.count):
+        for number in numbers:
             try:
                 whole = int(group[DONE][number]) < 0 or self._is_whole(group, number)
             except Exception:  # what a damaged chunk raises depends on where it is damaged
@@ -271,6 +273,29 @@ def stored_blocks(path: Path) -> int:
         return int(import_zarr().open_group(path, mode="r")[DONE].shape[0])
     except (OSError, KeyError, ValueError):
         return 0
+
+
+def command_of(path: Path) -> str:
+    """What a command noted in a store; empty if none did.
+
+    Arguments:
+        path: of the store.
+    """
+    try:
+        return str(import_zarr().open_group(path, mode="r").attrs.get(COMMAND, ""))
+    except (OSError, ValueError):
+        return ""
+
+
+def note_command(path: Path, text: str) -> None:
+    """Note in a store what fills it.
+
+    Arguments:
+        path: of the store.
+        text: the note.
+    """
+    if command_of(path) != text:
+        import_zarr().open_group(path, mode="r+").attrs[COMMAND] = text
 
 
 def _enter(path: Path, known: Mapping[str, np.ndarray], start: int) -> None:

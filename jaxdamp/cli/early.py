@@ -29,7 +29,7 @@ def check(command: str, given: Mapping[str, Any]) -> None:
     Raises:
         ValueError: such a path, file or folder.
     """
-    if "out" in given:
+    if "out" in given and given.get("block") is None:  # a part writes no results
         again = {"replace": bool(given["replace"]), "resume": bool(given.get("resume"))}
         refuse_target(resuming.target_of(command, given), command, **again)
     if given.get("files") and given.get("each") is None:  # a line may have its records in folders inside

@@ -38,6 +38,11 @@ class Output:
     show_units: str | None = None
     show_sign: str | None = None
 
+    def store(self, command: str) -> Path:
+        """Where a command keeps its blocks: a store beside the folder that it writes."""
+        out = self.out or Path(f"jaxdamp-{command}")
+        return out.with_name(f"{out.name}.zarr")
+
 
 class Job(NamedTuple):
     """A command at work.

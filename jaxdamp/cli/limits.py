@@ -10,7 +10,7 @@ from jaxdamp._display import display
 from jaxdamp._tables import typeset_unit
 from jaxdamp.bench import ratio
 from jaxdamp.cli.words import Axis, Bound, Limit, quantity
-from jaxdamp.parameters import match_paths, parameters
+from jaxdamp.parameters import match_paths, named_parameters
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -53,7 +53,7 @@ def bounds_in_si(bounds: Mapping[str, tuple[Bound, Bound]], models: Iterable[obj
         ValueError: a unit of something else, or of no parameter.
     """
     with_unit = [name for name, span in bounds.items() if any(isinstance(end, str) for end in span)]
-    units = {p.path: p.unit for model in models if with_unit for p in parameters(model)}
+    units = {p.path: p.unit for model in models if with_unit for p in named_parameters(model, bounds)}
     of = {name: units[match_paths(list(units), [name])[0]] for name in with_unit}
     return {name: tuple(_in_si("bound", name, end, of.get(name, "")) for end in span) for name, span in bounds.items()}
 
@@ -68,7 +68,7 @@ def axes_in_si(over: Mapping[str, Axis], car: AbstractVehicle) -> dict[str, np.n
     Raises:
         ValueError: a unit of something else, or of no parameter.
     """
-    units = {p.path: p.unit for p in parameters(car)}
+    units = {p.path: p.unit for p in named_parameters(car, over)}
     found = dict[str, np.ndarray]()
     for name, (values, written) in over.items():
         factor = ratio(written, units[match_paths(list(units), [name])[0]]) if written else 1.0

@@ -54,7 +54,6 @@ def fit_line(
     dampers = bench.read_dampers(files[0], each=each, **reading.read.arguments()).process(**reading.processing())
     if in_control is not None:
         _charts({"place": range(len(dampers))}, in_control)  # refuses too few or too many before anything is fitted
-    out = output.out or Path("jaxdamp-fit")
     with job(screen, "fit", output) as work:
         with screen.stage("Reading the first damper"):
             start = _start(dampers, name, rig)
@@ -67,7 +66,7 @@ def fit_line(
         with screen.stage(title) as advance, warnings.catch_warnings(action="ignore"):  # of dampers, which are remarks
             how["progress"] = lambda done, total: advance(f"{done} of {total}", done)
             fitting: Callable[..., ManyFits] = identify.fit_many
-            many = fitting(start, dampers, file=out.with_name(f"{out.name}.zarr"), **how)
+            many = fitting(start, dampers, file=output.store("fit"), **how)
         results = [many] if in_control is None else [many, _charts(many, in_control)]
         screen.answer(*(f"{result.summary}." for result in results))
         screen.remarks([text for result in results for text in result.warnings], style="yellow")

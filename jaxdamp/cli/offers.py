@@ -41,7 +41,7 @@ NOT_OFFERED = {  # arguments of library functions, and why
         "progress": "shown at the terminal",
     },
     "sweeps.sweep": {
-        "cluster": "an object of Python",
+        "cluster": "--block",
         "file": "what is finished is kept for --resume",
         "gradients": "for programs",
         "progress": "shown at the terminal",
@@ -104,6 +104,7 @@ WRITTEN = {  # by the name of the option, where its type does not say it
         "*:offset for every channel",
     ),
     "guide": Written(words.named_numbers(GUIDE, "sprung:friction=40"), "NAME:NUMBER=START", "sprung:friction=40"),
+    "block": Written(words.part, "PART/PARTS", "17/200", repeated=False),
     "bench": Written(lambda option, texts: texts, "FILE", "front.damper=FILE where there are several dampers"),
 }
 

@@ -26,7 +26,7 @@ COMMANDS = ("fit", "tune", "sweep", "report")
 RUN = "run.json"
 PARTS = (".piece", ".nc")  # of `_pieces.piece`, and the file of a sweep
 OLDEST = 30 * 86400.0  # s, after which what was kept for a run that nobody resumed is deleted
-_NO_MATTER = ("out", "replace", "resume", "verbose", "report", "show_units", "show_sign")  # numbers are the same
+_NO_MATTER = ("block", "out", "replace", "resume", "verbose", "report", "show_units", "show_sign")  # to numbers
 _now: dict[str, dict[str, str]] = {}  # the command that is running, in words
 
 
@@ -42,17 +42,28 @@ def noted(command: str, given: Mapping[str, object]) -> AbstractContextManager[N
     """
     resumes = command in COMMANDS and given.get("each") is None  # the fits of a line have a store of their own
     now = _described(command, given) if resumes else {}
-    before = _before(target_of(command, given)) if given.get("resume") else {}
-    differences = [
+    alone = given.get("block") is None  # parts go on by their store
+    before = _before(target_of(command, given)) if alone and given.get("resume") else {}
+    differences = differences_between(before, now)
+    if differences:
+        again = "Give what was given then, or leave out --resume to begin anew."
+        raise ValueError(f"What was interrupted cannot be resumed: {'; '.join(differences)}. {again}")
+    return _known(now)
+
+
+def differences_between(before: Mapping[str, dict[str, str]], now: Mapping[str, dict[str, str]]) -> list[str]:
+    """What a command is given otherwise than before, in words."""
+    return [
         _difference(name, before[kind].get(name), now[kind].get(name), is_file=kind == "files")
         for kind in before
         for name in dict.fromkeys([*before[kind], *now[kind]])
         if before[kind].get(name) != now[kind].get(name)
     ]
-    if differences:
-        again = "Give what was given then, or leave out --resume to begin anew."
-        raise ValueError(f"What was interrupted cannot be resumed: {'; '.join(differences)}. {again}")
-    return _known(now)
+
+
+def given_now() -> Mapping[str, dict[str, str]]:
+    """What the running command is given; empty if it was called from Python."""
+    return _now
 
 
 @contextmanager

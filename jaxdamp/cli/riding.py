@@ -16,7 +16,7 @@ from jaxdamp.cli.jobs import Output, job, with_step_warnings, without_range_warn
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.parameters import match_paths, parameters
+from jaxdamp.parameters import match_paths, named_parameters
 from jaxdamp.report import Table, axles_sentence, notes_of, ride_report, ride_tables, ride_verdict
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import Response
@@ -115,7 +115,7 @@ def beyond_vehicles(car: AbstractVehicle, over: Mapping[str, np.ndarray]) -> lis
     >>> beyond_vehicles(vehicles.presets.quarter_car_000(), {"damper.rate": np.array([1500.0, 1e300])})
     ['unusual: 1 of 2 values of damper.rate is beyond what vehicles have (up to 1e+06 N s/m), such as 1e+300.']
     """
-    units, notes = {p.path: p.unit for p in parameters(car)}, []
+    units, notes = {p.path: p.unit for p in named_parameters(car, over)}, []
     for name, values in over.items():
         unit = units[match_paths([*units], [name])[0]]
         least, most = USUAL_SIZES.get(unit, (0.0, np.inf))

@@ -1,7 +1,6 @@
 """`jaxdamp tune`: the free parameters of a vehicle for a ride metric, with limits; and `jaxdamp sweep`."""
 
 import json
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,18 +11,18 @@ import typer
 
 from jaxdamp import Ride, _checks, export, tune
 from jaxdamp._pieces import kept_file
-from jaxdamp.cli.choosing import choose, settings_of
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.controlling import Controlling
 from jaxdamp.cli.jobs import Output, job, write_tables
 from jaxdamp.cli.limits import axes_in_si, bounds_in_si, in_si
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.riding import Driving, beyond_vehicles, unusual
+from jaxdamp.cli.sharing import sweep_part, swept
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, read_module, with_law, write_laws
 from jaxdamp.cli.words import Axis
 from jaxdamp.control import Controlled
-from jaxdamp.dampers import AbstractDamper
-from jaxdamp.parameters import match_paths, parameters
+from jaxdamp.dampers import AbstractDamper, Scheduled
+from jaxdamp.parameters import match_paths, modules_inside, named_parameters
 from jaxdamp.report import MOST_POINTS, Table, best_points, sweep_report, tuning_report
 from jaxdamp.roads import WhiteRoad
 from jaxdamp.simulation import stationary_notes
@@ -71,9 +70,9 @@ def tune_command(
     if controlling.controller is not None:
         car = controlling.of(car, law)
         search = replace(search, given={"over": ["policy.**"], **search.given})
-    elif "over" not in search.given and settings_of(car):
-        _choose_setting(screen, car, minimise, surfaces, search, run, output, resume)
-        return
+    elif "over" not in search.given and (settings := _settings(car)):
+        search = replace(search, given={"over": settings, **search.given})
+        screen.points(["Every setting of the law is driven; --over names parameters to tune instead."])
     call, remarks = tuning_arguments(car, minimise, surfaces, search, driving.seed, run)
     screen.points(remarks)
     screen.points(unusual(road, driving.speed), style="yellow")
@@ -85,29 +84,10 @@ def tune_command(
     exit_code_of(result)
 
 
-def _choose_setting(
-    screen: Screen,
-    car: AbstractVehicle,
-    metric: str,
-    surfaces: Sequence[Any],
-    search: Call,
-    run: Mapping[str, Any],
-    output: Output,
-    resume: bool,
-) -> None:
-    """Drive every setting of laws that depend on one, and write the best."""
-    white = isinstance(surfaces[0], WhiteRoad)
-    limits, remarks = _limits(car, metric, search, white=white)
-    screen.points([*remarks, "Every setting of the law is driven; --over names parameters to tune instead."])
-    with job(screen, "tune", output, resume=resume) as work:
-        chosen = choose(screen, car, metric, surfaces, limits, run, white=white)
-        screen.table(chosen.table)
-        screen.say(chosen.verdict, style="bold")
-        with work.saving("Law, vehicle and table") as draft:
-            chosen.write(draft)
-        work.page(chosen.page)
-    if not chosen.met:
-        raise typer.Exit(1)
+def _settings(car: AbstractVehicle) -> dict[str, tune.Choice]:
+    """The settings of laws of several, such as the clicks of a sheet, by the name of the command."""
+    laws = ((path, law) for path, law in modules_inside(car) if isinstance(law, Scheduled))
+    return {f"{path}command": tune.Choice(np.asarray(law.levels)) for path, law in laws}
 
 
 def _realisations(road: str, driving: Driving, count: int) -> tuple[list[Any], dict[str, Any]]:
@@ -146,7 +126,8 @@ def tuned(screen: Screen, call: Mapping[str, Any]) -> TuneResult[Any]:
         result = tune.minimise(**call, progress=lambda step, value: advance(f"step {step}: {value:.5g}", step))
     screen.answer(result.verdict.sentence)
     screen.say(result.summary.removeprefix(result.verdict.sentence).strip())
-    screen.table(result.parameter_table())
+    rows = result.combinations.table() if result.combinations else result.parameter_table()
+    screen.table(rows.first(MOST_POINTS if screen.verbose else ON_SCREEN))
     screen.details(result.table())
     screen.remarks(result.warnings, style="yellow")
     return result
@@ -176,6 +157,8 @@ def write_tuning(folder: Path, result: TuneResult[Any]) -> None:
         tables["scenarios"] = result.scenario_table()
     if result.fresh is not None:
         tables["fresh_roads"] = result.fresh.table()
+    if result.combinations is not None:
+        tables["combinations"] = result.combinations.table()
     write_tables(folder, tables)
     text = json.dumps(result.to_dict(), indent=1, ensure_ascii=False) + "\n"
     (folder / "tuning.json").write_text(text, encoding="utf-8")
@@ -193,10 +176,15 @@ def sweep_command(
     driving: Driving,
     how: Annotated[Call, "sweeps.sweep"],
     baseline: Path | None = None,
+    block: str | None = None,
     resume: bool = False,
     output: Output,
 ) -> None:
     """Compute ride metrics over a grid of parameters: curves, maps and a table.
+
+    With --block, a process computes its part of the sweep into a store, the folder of --out with .zarr behind its name;
+    any number of them, one after the other or at once, as an array job has them. The same command without --block
+    computes what is missing there, and writes the results.
 
     Arguments:
         road: iso:A to iso:H, white:A to white:H, bump:HEIGHT:LENGTH [m], or a file of position, height.
@@ -204,9 +192,11 @@ def sweep_command(
         metric: comfort, travel, grip, or names of ride metrics.
         limit: limits.
         baseline: to compare with: another law, or another tuning's vehicle.json, as JSON.
+        block: compute this part of the sweep only, into a store; pip install 'jaxdamp[cluster]'.
     """
-    from jaxdamp.sweeps import sweep, without_effect  # with xarray and pandas, which other commands do without
+    from jaxdamp.sweeps import without_effect  # with xarray and pandas, which other commands do without
 
+    store = output.store("sweep")
     car = parse_vehicle(vehicle)(None if start is None else read_law("start", start))
     (surface,), run = driving.over(road)
     white = isinstance(surface, WhiteRoad)
@@ -221,12 +211,13 @@ def sweep_command(
     ride({name: values[0] for name, values in axes.items() if not ride.out_of_domain({name: values[:1]})[0]})
     screen.points(said)
     screen.points(unusual(road, driving.speed), style="yellow")
+    if block is not None:
+        sweep_part(screen, ride, axes, how, store, block)
+        return
     with job(screen, "sweep", output, resume=resume) as work:
-        with screen.stage("Driving") as advance, warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            shown = {"progress": lambda done, total: advance(f"{done} of {total} points", done)}
-            data = sweep(ride, axes, **how.arguments(file=kept_file("sweep.nc"), **shown))
-        remarks = beyond_vehicles(car, axes) + [str(warning.message) for warning in caught]
+        data, warned = swept(screen, ride, axes, how, store if store.exists() else kept_file("sweep.nc"))
+        data = data.load()
+        remarks = beyond_vehicles(car, axes) + warned
         at = _present(car, axes)
         at_start = {name: float(value) for name, value in ride(at if len(at) == len(axes) else None).items()}
         spans = limit_spans(limits, names, at_start)
@@ -259,7 +250,7 @@ def _comfort_and_grip(car: AbstractVehicle, names: Sequence[str], *, white: bool
 
 def _present(car: AbstractVehicle, over: Mapping[str, np.ndarray]) -> dict[str, float]:
     """The values that the vehicle has of the axes; those left out that stand for several different ones."""
-    known = {p.path: float(p.value) for p in parameters(car) if not np.shape(p.value)}
+    known = {p.path: float(p.value) for p in named_parameters(car, over) if not np.shape(p.value)}
     values = {name: {known[path] for path in match_paths(list(known), [name])} for name in over}
     return {name: value.pop() for name, value in values.items() if len(value) == 1}
 

@@ -16,6 +16,7 @@ OTHER_WORDS = {
     "paths": "FILES",
     "records": "FILES",
     "reversed_channels": "Option --reversed",
+    "file": "The store",
     "channel": "A channel of --units or --reversed",
     "road_class": "CLASS in --road iso:CLASS",
     "skip_cycles": "Option --cycles",
@@ -24,6 +25,7 @@ OTHER_WORDS = {
     "metrics": "Option --metric",
 }
 CALLS = {
+    r"Choose another name, or delete the folder": "Name another folder with --out, or delete the store",
     r" It is in `result\.rig`, not in the law,": " It is in machines/, not in the law,",
     r"; `law \+ dampers\.Spring\([^`]*` is the damper if it is gas": "",
     r'add "(\w+)" or "(\w+)" to the machine \(`rig`\)': r"add --rig \1 or --rig \2",

@@ -107,6 +107,12 @@ def numbers_in_order(option: str, given: Sequence[str]) -> list[float]:
         _checks.refuse(option, "read like 0.052,0.131", repr(",".join(given)))
 
 
+def part(option: str, given: str) -> str:
+    """A part of so many, such as 17/200."""
+    _checks.part_of(option, given)
+    return given
+
+
 def names_or_numbers(option: str, given: Sequence[str]) -> str | list[float]:
     """One word, or numbers."""
     try:

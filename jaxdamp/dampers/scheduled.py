@@ -17,10 +17,18 @@ from jaxdamp.dampers.contract import Traits, combined_traits
 from jaxdamp.dampers.fitted_range import without_fitted_ranges
 from jaxdamp.dampers.sum import Scaled, Sum
 from jaxdamp.dampers.wrapper import AbstractWrapper
-from jaxdamp.parameters import increasing, setting
+from jaxdamp.parameters import Domain, increasing, interval, real, setting
 
 
 BLENDS = ("parameters", "force")
+
+
+def _between_levels(law: "Scheduled") -> Domain:
+    """Where a command can be: between the outer levels, where those are known."""
+    levels = _checks.concrete(law.levels)
+    if levels is None or levels.ndim != 1 or not increasing.contains(levels) or levels.size < 2:
+        return real
+    return interval(*levels[[0, -1]].tolist())
 
 
 @final
@@ -66,7 +74,7 @@ class Scheduled(AbstractWrapper):
 
     laws: tuple[AbstractDamper, ...]
     levels: Vector = setting("", "commands of the laws", increasing)
-    command: Number = setting("", "command, in the unit of the levels", command=True)
+    command: Number = setting("", "command, in the unit of the levels", _between_levels, command=True)
     blend: str = eqx.field(static=True, default="parameters")
 
     def __check_init__(self) -> None:
@@ -78,10 +86,6 @@ class Scheduled(AbstractWrapper):
         if self.blend == "parameters" and not self.of_equal_structure(self.laws):
             remedy = 'Blend their forces, `blend="force"`, or use one law class with vectors of equal length.'
             _checks.refuse("laws", "be of equal structure", ", ".join(map(repr, self.laws)), remedy)
-        command, levels = _checks.concrete(self.command), _checks.concrete(self.levels)
-        if command is not None and levels is not None and not levels[0] <= command <= levels[-1]:
-            must = f"be between the levels {levels[0]:g} and {levels[-1]:g}"
-            _checks.refuse("command", must, f"{command:g}", "Add a law at a level further out.")
 
     @staticmethod
     def of_equal_structure(laws: Sequence[AbstractDamper]) -> bool:

@@ -1,7 +1,7 @@
 """The states of a law at the start of a record: at rest, after a warm-up cycle, periodic, or estimated."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, TypeAlias, final
+from typing import NamedTuple, TypeAlias, final
 from weakref import WeakKeyDictionary
 
 import equinox as eqx
@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, PyTree
 
 from jaxdamp._root import ImplicitDerivatives
 from jaxdamp._types import Scalar, State
@@ -147,13 +147,17 @@ class _Extrapolation(optx.AbstractFixedPointSolver):
 
     atol: float = SETTLED
     rtol: float = 0.0
-    norm: Callable[[Any], Array] = eqx.field(static=True, default=optx.max_norm)
+    norm: Callable[[PyTree], Array] = eqx.field(static=True, default=optx.max_norm)
 
-    def init(self, fn: Any, y: Any, args: Any, options: Any, f_struct: Any, aux_struct: Any, tags: Any) -> _Before:
+    def init(
+        self, fn: Callable, y: State, args: PyTree, options: dict, f_struct: PyTree, aux_struct: PyTree, tags: frozenset
+    ) -> _Before:
         """Nothing is known of the first states."""
         return _Before(y, jnp.full((), jnp.inf, y.dtype))
 
-    def step(self, fn: Any, y: Any, args: Any, options: Any, state: _Before, tags: Any) -> tuple[State, _Before, None]:
+    def step(
+        self, fn: Callable, y: State, args: PyTree, options: dict, state: _Before, tags: frozenset
+    ) -> tuple[State, _Before, None]:
         """One extrapolation, or a cycle after the states before if these were better."""
         later, slopes, error = _linearised(y, args)
         worse = ~(error < state.error)
@@ -163,14 +167,22 @@ class _Extrapolation(optx.AbstractFixedPointSolver):
         return jnp.where(worse, state.otherwise, ahead), before, None
 
     def terminate(
-        self, fn: Any, y: Any, args: Any, options: Any, state: _Before, tags: Any
+        self, fn: Callable, y: State, args: PyTree, options: dict, state: _Before, tags: frozenset
     ) -> tuple[Bool[Array, ""], optx.RESULTS]:
         """Where a cycle changes nothing, or cannot be computed."""
         return ~(state.error > self.atol), optx.RESULTS.successful
 
     def postprocess(
-        self, fn: Any, y: Any, aux: Any, args: Any, options: Any, state: Any, tags: Any, result: Any
-    ) -> tuple[Any, Any, dict[str, Any]]:
+        self,
+        fn: Callable,
+        y: State,
+        aux: PyTree,
+        args: PyTree,
+        options: dict,
+        state: _Before,
+        tags: frozenset,
+        result: optx.RESULTS,
+    ) -> tuple[State, PyTree, dict[str, object]]:
         """As it is."""
         return y, aux, {}
 

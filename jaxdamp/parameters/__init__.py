@@ -43,6 +43,7 @@ from jaxdamp.parameters._paths import (
     matched_in_words as matched_in_words,
     matching as matching,
     name_patterns as name_patterns,
+    named_parameters as named_parameters,
     replace,
     with_values as with_values,
 )

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, dataclass_transform
+from typing import TYPE_CHECKING, Any, TypeAlias, dataclass_transform
 
 import equinox as eqx
 import jax
@@ -48,10 +48,13 @@ def as_float(value: object, name: str = "value") -> Array:
         raise
 
 
+DomainOf: TypeAlias = Domain | Callable[[Any], Domain]
+
+
 def parameter(
     unit: str,
     meaning: str,
-    domain: Domain | Callable[[Any], Domain] = real,
+    domain: DomainOf = real,
     *,
     linear: bool = False,
     adjustable: bool = True,
@@ -72,15 +75,16 @@ def parameter(
     return _number("parameter", declared, field)
 
 
-def setting(unit: str, meaning: str, domain: Domain = real, *, command: bool = False, **field: Any) -> Any:
+def setting(unit: str, meaning: str, domain: DomainOf = real, *, command: bool = False, **field: Any) -> Any:
     """Declare a field as a number with a unit that fits and tunings never change, such as a knee width.
 
-    A `command` is set from outside, run by run, such as a coil current (`dampers.with_command`).
+    A `command` is set from outside, run by run, such as a coil current (`dampers.with_command`). Sweeps and tunings
+    change one that is named.
 
     Arguments:
         unit: in SI.
         meaning: in words.
-        domain: the values that it may take.
+        domain: the values that it may take; a function of the instance if they depend on another setting.
         command: whether it is set from outside.
         field: further arguments of `equinox.field`, such as a default.
     """
@@ -121,6 +125,7 @@ class Parameter(eqx.Module):
         domain: the values that it may take.
         linear: whether the force is linear in it.
         adjustable: whether a workshop can change it.
+        command: whether it is a command, such as a coil current or a click.
     """
 
     path: str = eqx.field(static=True)
@@ -130,6 +135,7 @@ class Parameter(eqx.Module):
     domain: Domain = eqx.field(static=True)
     linear: bool = eqx.field(static=True)
     adjustable: bool = eqx.field(static=True, default=True)
+    command: bool = eqx.field(static=True, default=False)
 
 
 def _children(tree: object) -> Iterable[tuple[object, Any]]:
@@ -181,12 +187,13 @@ def domain_of(declared: dict[str, Any], module: eqx.Module) -> Domain:
     return domain if isinstance(domain, Domain) else domain(module)
 
 
-def parameters(tree: object, prefix: str = "") -> list[Parameter]:
+def parameters(tree: object, prefix: str = "", *, commands: bool = False) -> list[Parameter]:
     """All parameters of a law, vehicle or any other module, depth first in the order of their fields.
 
     Arguments:
         tree: the module.
         prefix: put before each path.
+        commands: whether commands are listed too, such as coil currents.
 
     >>> from jaxdamp.dampers import Lag, Linear
     >>> [(p.path, p.unit, float(p.value)) for p in parameters(Lag(Linear(1500.0), lag_time=0.004))]
@@ -194,10 +201,12 @@ def parameters(tree: object, prefix: str = "") -> list[Parameter]:
     """
     listed = []
     for path, module, metadata in declared_inside(tree, prefix):
-        if declared := metadata.get("parameter"):
+        declared = metadata.get("parameter") or metadata.get("setting", {})
+        is_command = commands and declared.get("command", False)
+        if "parameter" in metadata or is_command:
             words = declared["unit"], declared["meaning"]
-            traits = domain_of(declared, module), declared["linear"], declared["adjustable"]
-            listed.append(Parameter(path, getattr(module, path.rsplit(".", 1)[-1]), *words, *traits))
+            traits = domain_of(declared, module), declared.get("linear", False), declared.get("adjustable", True)
+            listed.append(Parameter(path, getattr(module, path.rsplit(".", 1)[-1]), *words, *traits, is_command))
     return listed
 
 

@@ -12,9 +12,9 @@ from jax.core import Tracer
 from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
-from jaxdamp.parameters._declaration import Parameter, parameters
+from jaxdamp.parameters._declaration import Parameter
 from jaxdamp.parameters._domains import interval, ordered_interval
-from jaxdamp.parameters._paths import expression, match_paths, name_patterns, with_values
+from jaxdamp.parameters._paths import expression, match_paths, name_patterns, named_parameters, with_values
 
 
 EXAMPLE = "Write for example tie={'front.damper.**': 'rear.damper.**'}: the front takes the values of the rear."
@@ -182,7 +182,8 @@ def free_parameters(
 
     Arguments:
         tree: a law, a vehicle or any module.
-        over: paths, last parts of paths or patterns with `*` and `**` (`match_paths`); all parameters if not given.
+        over: paths, last parts of paths or patterns with `*` and `**` (`match_paths`); all parameters if not given. A
+            command (a coil current, a click) is free only by its own name, as in `"**.command"`.
         freeze: names of parameters to hold at their values.
         bounds: extra limits `{path: (lower, upper)}` in the parameter's unit.
         tie: parameters that take the values of others, as `{"front.damper.**": "rear.damper.**"}`; `*` and `**` stand
@@ -200,9 +201,13 @@ def free_parameters(
     ['rear.damper.rate']
     """
     _checks.untraced("bounds", dict(bounds or {}), "Give plain numbers, which are known before a program is compiled.")
-    all_parameters = parameters(tree)
+    names = ["**"] if over is None else name_patterns("over", over)
+    all_parameters = _known(tree, names, tie)
     known = [p.path for p in all_parameters]
-    keep = match_paths(known, name_patterns("over", over)) if over is not None else known
+    if not known:
+        remedy = "Declare its numbers by `parameter(unit, meaning)`; the weights of a network are trained by optax."
+        _checks.refuse("law", "have parameters", f"a {type(tree).__name__} without", remedy)
+    keep = match_paths(known, names)
     frozen = match_paths(known, name_patterns("freeze", freeze))
     leaders = resolve_ties(all_parameters, tie)
 
@@ -217,12 +222,15 @@ def free_parameters(
         for p in all_parameters
         if p.path in free
     ]
-    if not known:
-        remedy = "Declare its numbers by `parameter(unit, meaning)`; the weights of a network are trained by optax."
-        _checks.refuse("law", "have parameters", f"a {type(tree).__name__} without", remedy)
     if not chosen:
         raise ValueError(f"All parameters are frozen, nothing is left to change: {', '.join(known)}.")
     return FreeParameters(tree, tuple(chosen), tuple(pair for pair in leaders.items() if pair[1] in free))
+
+
+def _known(tree: object, names: Sequence[str], tie: object) -> list[Parameter]:
+    """All parameters, and the commands that are named or tied."""
+    tied = (*tie, *tie.values()) if isinstance(tie, Mapping) else ()  # anything else is refused where ties are resolved
+    return named_parameters(tree, [*names, *map(str, tied)])
 
 
 def _limits_by_path(

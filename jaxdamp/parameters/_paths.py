@@ -1,6 +1,7 @@
 """Paths of parameters: matching names and patterns, reading and replacing values, and the checks of modules."""
 
 import dataclasses
+import itertools
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
@@ -12,7 +13,15 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._field_types import check_field_types
 from jaxdamp._traced import behind
-from jaxdamp.parameters._declaration import Module, as_float, domain_of, modules_inside, parameters, readable
+from jaxdamp.parameters._declaration import (
+    Module,
+    Parameter,
+    as_float,
+    domain_of,
+    modules_inside,
+    parameters,
+    readable,
+)
 
 
 Tree = TypeVar("Tree")
@@ -108,16 +117,35 @@ def replace(tree: Tree, values: Mapping[str, object]) -> Tree:
 
     Arguments:
         tree: the tree.
-        values: new values by path, in the units of the parameters.
+        values: new values by path, in the units of the parameters; also of commands, by their names.
 
     >>> from jaxdamp.dampers import Linear
     >>> float(replace(Linear(1500.0), {"rate": 2000.0}).rate)
     2000.0
     """
-    known = [p.path for p in parameters(tree)]
+    known = [p.path for p in named_parameters(tree, values)]
     return checked(
         with_values(tree, {p: as_float(v) for name, v in values.items() for p in match_paths(known, [name])})
     )
+
+
+def named_parameters(tree: object, names: Iterable[str]) -> list[Parameter]:
+    """All parameters, and those commands (coil currents, clicks) whose own name, without `*`, ends one of the names.
+
+    Arguments:
+        tree: a law, a vehicle or any module.
+        names: names and patterns, as in `match_paths`.
+
+    >>> from jaxdamp.dampers import Linear, Scheduled
+    >>> law = 2.0 * Scheduled((Linear(900.0), Linear(1500.0)), levels=[0.0, 1.0], command=0.5)
+    >>> [[p.path for p in named_parameters(law, [name])][-2] for name in ("*.command", "law.*")]
+    ['law.command', 'law.laws.1.rate']
+    """
+    every = parameters(tree, commands=True)
+    paths = [p.path for p in every]
+    hits = [matching(paths, name) for name in names if "*" not in name.rpartition(".")[2]]
+    named = set(itertools.chain(*hits)) if all(hits) else set(paths)  # all are offered in place of a wrong name
+    return [p for p in every if not p.command or p.path in named]
 
 
 def match_paths(known: Sequence[str], patterns: Sequence[str]) -> list[str]:

@@ -169,17 +169,19 @@ def damper(panels: Sequence[Axes], shown: _rides.Rides, path: str) -> None:
             edges = np.linspace(-reach, reach, _BINS + 1)
             share = 100.0 * np.histogram(velocity, edges)[0] / len(velocity)
             shares.step(0.5 * (edges[1:] + edges[:-1]), share, where="mid", **style)
-    _thousandths(*panels)
     title = _style.first_upper(_style.in_words(path).removesuffix(" law"))
     _style.dress(curves, "", "force [N]", title + ", at all levels of its command" * several, turns="y")
     _style.cross(curves)
-    _style.dress(shares, "velocity [mm/s]   (+ rebound)", "time [%]", _rides.quadrants(velocities[1]))
+    _style.dress(shares, "", "time [%]", _rides.quadrants(velocities[1]))
+    for axes in panels:
+        _style.label_axis(axes, "x", "velocity [mm/s]   (+ rebound)", times=_MM)
     curves.set_xlim(-reach, reach)
     if len(shown.styles()) > 1:
         drawn = [line for line in curves.get_lines() if not str(line.get_label()).startswith("_")]
         curves.legend(handles=drawn, frameon=False, loc="upper left")
     for above in (curves, *damping):
         above.tick_params(labelbottom=False)
+        above.set_xlabel("")
 
 
 def _draw_law(curves: Axes, damping: Sequence[Axes], shown: _rides.Rides, path: str, points: np.ndarray) -> bool:
@@ -199,11 +201,3 @@ def _draw_law(curves: Axes, damping: Sequence[Axes], shown: _rides.Rides, path: 
         axes.set_ylim(0.0, max(heights))
         wheel_axis(axes, [one for one in critical if one is not None])
     return len(laws[1]) > 1
-
-
-def _thousandths(*panels: Axes) -> None:
-    """Ticks of axes over m/s in mm/s."""
-    from matplotlib.ticker import FuncFormatter
-
-    for axes in panels:
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: _style.short(_MM * value)))

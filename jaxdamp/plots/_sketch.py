@@ -29,7 +29,7 @@ def sketch(axes: Axes, vehicle: AbstractVehicle) -> None:
     axes.set_ylim(0.0, max(y) + _THICK)
     _bodies(axes, drawing, x, y)
     springs = [
-        (y[upper], f"{_style.short(1e-3 * float(link.stiffness))} N/mm", x[upper], foot[lower])
+        (y[upper], _style.quantity(float(link.stiffness), "N/m"), x[upper], foot[lower])
         for link, (upper, lower) in zip(drawing.springs, parts["springs"], strict=True)
         if near[upper] and float(link.stiffness)
     ]
@@ -52,7 +52,7 @@ def _bodies(axes: Axes, drawing: Drawing, x: Sequence[float], y: Sequence[float]
     for body, drawn in zip(drawing.bodies, drawing.parts["bodies"], strict=True):
         right, left, bottom = x[drawn["corners"][0]], x[drawn["corners"][1]], y[drawn["corners"][0]]
         axes.add_patch(Rectangle((left, bottom), right - left, _THICK, facecolor="0.92", edgecolor=_style.BLACK))
-        name = f"{_style.in_words(body.name).replace('sprung', 'body')}, {_style.short(float(body.mass))} kg"
+        name = f"{_style.in_words(body.name).replace('sprung', 'body')}, {_style.quantity(float(body.mass), 'kg')}"
         axes.text(0.5 * (left + right), bottom + 0.5 * _THICK, name, ha="center", **_SMALL)
     for beam in drawing.parts["beams"]:
         axes.plot([x[k] for k in beam], [y[k] for k in beam], color=_style.BLACK, linewidth=2.5)
@@ -84,8 +84,8 @@ def _wheels(axes: Axes, drawing: Drawing, x: Sequence[float], y: Sequence[float]
         body = drawing.body_of(point)
         if body not in masses:  # of a hull, whose wheels are on the springs of the body
             _spring(axes, place, _WHEEL, y[point], "")
-        mass = f"{_style.short(masses[body])} kg, tyre\n" if body in masses else ""
-        labels.append((f"{mass}{_style.short(1e-3 * rate)} N/mm", place, body if mass else point))
+        mass = f"{_style.quantity(masses[body], 'kg')}, tyre\n" if body in masses else ""
+        labels.append((f"{mass}{_style.quantity(rate, 'N/m')}", place, body if mass else point))
     for label, same in groupby(labels, key=lambda one: one[0]):
         *others, (_, place, owner) = same
         words = "each " * any(other[2] != owner for other in others) + label

@@ -142,13 +142,14 @@ def short(value: float) -> str:
 
 
 def quantity(value: float, unit: str) -> str:
-    """A number with its unit for people: strokes in mm.
+    """A number with its unit for people, in the units that are shown: strokes in mm, rates of springs in N/mm.
 
-    >>> quantity(0.0745, "m"), quantity(1.25, "m/s^2"), quantity(3.0, "")
-    ('74.5 mm', '1.25 m/s²', '3')
+    >>> quantity(0.0745, "m"), quantity(60e3, "N/m"), quantity(1.25, "m/s^2"), quantity(3.0, "")
+    ('74.5 mm', '60 N/mm', '1.25 m/s²', '3')
     """
-    value, unit = (1e3 * value, "mm") if unit == "m" else (value, typeset_unit(unit))
-    return f"{short(value)} {unit}".rstrip()
+    factor, unit = {"m": (1e3, "mm"), "N/m": (1e-3, "N/mm")}.get(unit, (1.0, unit))
+    shown = display().of(unit)
+    return f"{short(shown(factor * value))} {typeset_unit(shown.unit)}".rstrip()
 
 
 def percent(value: float, digits: int = 0) -> str:
@@ -199,14 +200,46 @@ def dress(axes: Axes, x: str, y: str, title: str = "", *, turns: Literal["", "y"
     round numbers of the other unit, and an axis of the other sign runs the other way: one whose label has the sign, or
     that is among those that `turns` names.
     """
-    for axis, name, label in ((axes.xaxis, "x", x), (axes.yaxis, "y", y)):
-        wrap(axis.set_label_text(display().text(label)), axes)
-        _rescale(axis, label, name in turns)
+    label_axis(axes, "x", x, turns="x" in turns)
+    label_axis(axes, "y", y, turns="y" in turns)
     if title:
         wrap(axes.set_title(display().words(title), loc="left", fontsize="medium"), axes)
     axes.grid(True, color="0.9", linewidth=0.8)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
+
+
+def label_axis(axes: Axes, name: Literal["x", "y"], label: str, *, turns: bool = False, times: float = 1.0) -> None:
+    """The label of one axis, and ticks in the unit and the sign that are shown, by the unit in the label.
+
+    Arguments:
+        axes: with the axis.
+        name: of the axis.
+        label: with its unit in brackets.
+        turns: whether its sign is that of the direction, also if the label does not say so.
+        times: the numbers drawn, times this, are in the unit of the label.
+    """
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+    axis = axes.xaxis if name == "x" else axes.yaxis
+    wrap(axis.set_label_text(display().text(label)), axes)
+    found = re.search(r"\[([^\[\]]+)\]", label)
+    shown = display().of(found[1] if found else "", signed=turns or "+" in display().text(label))
+    factor = times * shown.factor
+    if factor == 1.0 or axis.get_scale() != "linear":
+        return
+
+    class Ticks(MaxNLocator):
+        def tick_values(self, vmin: float, vmax: float) -> Any:
+            ends = sorted((factor * vmin, factor * vmax))
+            return np.sort(np.asarray(super().tick_values(*ends)) / factor)
+
+    axis.set_major_locator(Ticks(nbins="auto", steps=[1, 2, 2.5, 4, 5, 10]))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{round(factor * value, 9) + 0.0:g}".replace("-", "−")))
+    if factor < 0.0:
+        axis.set_inverted(True)
+        change = f"{name}lim_changed"
+        axes.callbacks.connect(change, lambda _: None if axis.get_inverted() else axis.set_inverted(True))
 
 
 _SLACK = 0.35  # inch, by which a title or label may be longer than its axes
@@ -253,28 +286,6 @@ def few_ticks(axes: Axes, most: int) -> None:
             return before.tick_values(vmin, vmax)
 
     axes.xaxis.set_major_locator(Ticks())
-
-
-def _rescale(axis: "matplotlib.axis.Axis", label: str, turns: bool = False) -> None:
-    """Ticks of an axis in the unit and the sign that are shown, by the unit in its label."""
-    from matplotlib.ticker import FuncFormatter, MaxNLocator
-
-    found = re.search(r"\[([^\[\]]+)\]", label)
-    shown = display().of(found[1] if found else "", signed=turns or "+" in display().text(label))
-    if shown.factor == 1.0 or axis.get_scale() != "linear":
-        return
-
-    class Ticks(MaxNLocator):
-        def tick_values(self, vmin: float, vmax: float) -> Any:
-            ends = sorted((shown(vmin), shown(vmax)))
-            return np.sort(np.asarray(super().tick_values(*ends)) / shown.factor)
-
-    axis.set_major_locator(Ticks(nbins="auto", steps=[1, 2, 2.5, 4, 5, 10]))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{round(shown(value), 9) + 0.0:g}".replace("-", "−")))
-    if shown.factor < 0.0:
-        axis.set_inverted(True)
-        change = f"{'x' if axis is axis.axes.xaxis else 'y'}lim_changed"
-        axis.axes.callbacks.connect(change, lambda _: None if axis.get_inverted() else axis.set_inverted(True))
 
 
 def cross(axes: Axes, horizontal: bool = True, vertical: bool = True) -> None:

@@ -48,6 +48,7 @@ def sweep_report(
     >>> "area" in sweep_report(data).to_html()
     True
     """
+    data = data.compute()  # a store is read when it is asked for
     report = Report(title, folder, attempts)
     report.verdict(*best_points(data, limits, baseline))
     report.points(remarks)

@@ -17,6 +17,9 @@ from jaxdamp.tune import Rescore, TuneResult, damper_paths
 from jaxdamp.vehicles import AbstractVehicle
 
 
+MOST_COMBINATIONS = 100  # rows of choices on a page, the best first
+
+
 def tuning_report(
     result: TuneResult[Any],
     *,
@@ -69,6 +72,8 @@ def add_tuning(
         elsewhere: result on the other roads, in words; by default those of `rescored`.
     """
     report.table(result.parameter_table())
+    if result.combinations is not None:
+        report.table(result.combinations.table().first(MOST_COMBINATIONS))
     report.table(result.table())
     report.text(outcome)
     report.points([*result.active, *result.warnings])

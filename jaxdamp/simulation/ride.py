@@ -23,7 +23,7 @@ from jaxdamp.codegen import compiler
 from jaxdamp.configuration import one_at_a_time, target
 from jaxdamp.dampers import RangeUse, has_fitted_range
 from jaxdamp.metrics import Metric, MetricValues
-from jaxdamp.parameters import as_float, match_paths, parameters, replace
+from jaxdamp.parameters import as_float, match_paths, named_parameters, parameters, replace
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation.engine import AbstractEngine, check_control, chosen_engine
 from jaxdamp.simulation.equations import Equations, settled
@@ -137,7 +137,7 @@ class Ride(eqx.Module):
     def units(self) -> dict[str, str]:
         """Units of the metrics, and of the parameters by path and by its last part."""
         channels = self.vehicle.units
-        by_path = {p.path: p.unit for p in parameters(self.vehicle)}
+        by_path = {p.path: p.unit for p in parameters(self.vehicle, commands=True)}
         by_name = {path.rpartition(".")[2]: unit for path, unit in by_path.items()}
         return by_name | by_path | {m.name: m.unit(channels) for m in self.metrics}
 
@@ -246,7 +246,7 @@ class Ride(eqx.Module):
 
     def _check_shape(self, name: str, shape: tuple[int, ...]) -> None:
         """Refuse several numbers for one, which would be several cars."""
-        shapes = {p.path: p.value.shape for p in parameters(self.vehicle)}
+        shapes = {p.path: p.value.shape for p in named_parameters(self.vehicle, [name])}
         for path in match_paths(list(shapes), [name]):
             if shapes[path] != shape:
                 must = "be one number for one car" if shapes[path] == () else f"be of shape {shapes[path]}"

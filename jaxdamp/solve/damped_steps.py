@@ -3,12 +3,25 @@
 All arrays have the axes of the lanes first: one in a loop on the host, none inside JAX, where `jax.vmap` adds them.
 """
 
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from types import ModuleType
+from typing import NamedTuple, TypeAlias, TypeVar
 
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
+from jaxtyping import Array, Bool, Float, Int, PyTree
+
+
+Numbers: TypeAlias = Array | np.ndarray
+EachLane: TypeAlias = Float[Numbers, "*lanes"]
+LaneMask: TypeAlias = Bool[Numbers, "*lanes"]
+Unknowns: TypeAlias = Float[Numbers, "*lanes unknowns"]
+Triangles: TypeAlias = Float[Numbers, "*lanes columns columns"]
+_Carry: TypeAlias = tuple[Numbers, Numbers, Numbers, Numbers | np.bool_]
+Flat = TypeVar("Flat", Array, np.ndarray)
+Tree = TypeVar("Tree")
 
 
 WORTHWHILE = 1e-3  # of the predicted decrease, for a step to be accepted
@@ -28,64 +41,68 @@ class Linearisation(NamedTuple):
 
     Attributes:
         rows: the Jacobian with the residual as its last column, relative to the size of the data, or any rows with the
-            same products of columns, shape (*lanes, rows, unknowns + 1).
-        margins: by how much each condition between unknowns holds, shape (*lanes, conditions).
-        margin_slopes: their derivatives by the unknowns, shape (*lanes, conditions, unknowns).
-        samples: number of residuals, for the tolerance in standard errors, shape (*lanes,).
+            same products of columns; a column for each unknown and one more.
+        margins: by how much each condition between unknowns holds.
+        margin_slopes: their derivatives by the unknowns.
+        samples: number of residuals, for the tolerance in standard errors.
     """
 
-    rows: Any
-    margins: Any
-    margin_slopes: Any
-    samples: Any
+    rows: Float[Numbers, "*lanes rows columns"]
+    margins: Float[Numbers, "*lanes conditions"]
+    margin_slopes: Float[Numbers, "*lanes conditions unknowns"]
+    samples: Numbers | int
 
 
 class State(NamedTuple):
     """The accepted point with its linearised problem, and the point to be tried next, with the axes of the lanes."""
 
-    trial: Any  # the point to be tried
-    triangle: Any  # of the rows of the accepted point
-    scale: Any  # of the damping: the largest norms of the Jacobian's columns so far (as in MINPACK)
-    conditions: Any  # slopes of the conditions, of length one
-    least: Any  # of the conditions times a step
-    step_size: Any  # inverse of the damping
-    predicted: Any  # decrease of half the sum of squares at the point to be tried
-    floor: Any  # of a decrease that counts
-    short: Any  # whether the step is shorter than the tolerances
-    whole: Any  # whether it is the step without damping
-    steps: Any  # points tried
-    converged: Any  # whether the search has ended by its tolerance
-    stuck: Any  # whether there is no further step
-    aux: Any  # what the residual gives beside its value at the accepted point
+    trial: Unknowns  # the point to be tried
+    triangle: Triangles  # of the rows of the accepted point
+    scale: Unknowns  # of the damping: largest norms of the Jacobian's columns so far (MINPACK)
+    conditions: Float[Numbers, "*lanes conditions unknowns"]  # slopes of the conditions, of length one
+    least: Float[Numbers, "*lanes conditions"]  # of the conditions times a step
+    step_size: EachLane  # inverse of the damping
+    predicted: EachLane  # decrease of half the sum of squares at the point to be tried
+    floor: EachLane  # of a decrease that counts
+    short: LaneMask  # whether the step is shorter than the tolerances
+    whole: LaneMask  # whether it is the step without damping
+    steps: Int[Numbers, "*lanes"]  # points tried
+    converged: LaneMask  # whether the search has ended by its tolerance
+    stuck: LaneMask  # whether there is no further step
+    aux: PyTree  # what the residual gives beside its value at the accepted point
 
 
 class _Proposal(NamedTuple):
     """A step with what decides whether the search would end by it."""
 
-    step: Any
-    predicted: Any
-    short: Any
-    small: Any  # whether the search would end by it; true of one that is not finite
+    step: Unknowns
+    predicted: EachLane
+    short: LaneMask
+    small: LaneMask  # whether the search would end by it; true of one that is not finite
 
 
 class Rules(NamedTuple):
     """Bounds as vectors, and the tolerances of a `BoundedLevenbergMarquardt`."""
 
-    lower: Any
-    upper: Any
+    lower: Float[Numbers, " unknowns"] | float
+    upper: Float[Numbers, " unknowns"] | float
     tolerance: float
     precision: float
     rtol: float
     atol: float
 
 
-def at_edges(flat: Any, rules: Rules) -> Any:
+def _library(array: Numbers) -> ModuleType:
+    return np if isinstance(array, np.ndarray) else jnp
+
+
+def at_edges(flat: Flat, rules: Rules) -> Flat:
     """The vector of unknowns with those very near their lower bound on it."""
-    xp: Any = np if isinstance(flat, np.ndarray) else jnp
+    xp = _library(flat)
     return xp.where(xp.abs(flat - rules.lower) < AT_EDGE, rules.lower, flat)
 
 
-def judged(xp: Any, state: State, here: Linearisation, aux: Any) -> tuple[Any, State]:
+def judged(xp: ModuleType, state: State, here: Linearisation, aux: PyTree) -> tuple[LaneMask, State]:
     """Whether the point tried is accepted, and the state with its linearised problem if it is."""
     first, tried = state.steps == 0, _triangle(xp, here.rows)
     old, new = _half_squares(state.triangle), _half_squares(tried)
@@ -113,20 +130,27 @@ def judged(xp: Any, state: State, here: Linearisation, aux: Any) -> tuple[Any, S
     return accepted, state._replace(step_size=step_size, steps=state.steps + 1, converged=converged, **chosen)
 
 
-def with_proposal(xp: Any, rules: Rules, state: State, y: Any, samples: Any, accepted: Any) -> State:
+def with_proposal(
+    xp: ModuleType,
+    rules: Rules,
+    state: State,
+    y: Unknowns,
+    samples: Numbers | int,
+    accepted: LaneMask,
+) -> State:
     """The state with the next point to be tried."""
     rounding = ROUNDING * rules.precision
     floor = xp.maximum(rounding, rules.tolerance**2 / samples) * _half_squares(state.triangle) + rounding**2
     limits = (rules.lower - y, rules.upper - y)
     lower, upper = (xp.where(xp.abs(a) > NEAR, MOST_OF_THE_WAY * a, a) for a in limits)
 
-    def at(step_size: Any) -> _Proposal:
+    def at(step_size: EachLane) -> _Proposal:
         step = _damped_step(xp, state, step_size, lower, upper)
         predicted = _decrease(state.triangle, step)
         short = xp.all(xp.abs(step) <= rules.atol + rules.rtol * xp.abs(y), axis=-1)
         return _Proposal(step, predicted, short, ~(predicted >= floor) | short)
 
-    def longer(carry: tuple[Any, Any, _Proposal]) -> tuple[Any, Any, _Proposal]:
+    def longer(carry: tuple[Numbers, Numbers, _Proposal]) -> tuple[Numbers, Numbers, _Proposal]:
         size, again, proposal = carry
         size = xp.where(again, size * MOST_GROWTH, size)
         proposal = where(xp, again, at(size), proposal)
@@ -151,20 +175,22 @@ def with_proposal(xp: Any, rules: Rules, state: State, y: Any, samples: Any, acc
     )
 
 
-def where(xp: Any, mask: Any, new: Any, old: Any) -> Any:
+def where(xp: ModuleType, mask: LaneMask, new: Tree, old: Tree) -> Tree:
     """A tree with leaves of one or the other for each lane."""
     if xp is np and np.all(mask):
         return new
     if xp is np and not np.any(mask):
         return old
 
-    def chosen(new: Any, old: Any) -> Any:
+    def chosen(new: Numbers, old: Numbers) -> Numbers:
         return xp.where(mask.reshape(mask.shape + (1,) * (new.ndim - mask.ndim)), new, old)
 
     return jtu.tree_map(chosen, new, old)
 
 
-def _while(xp: Any, condition: Any, body: Any, carry: Any) -> Any:
+def _while(
+    xp: ModuleType, condition: Callable[[Tree], Numbers | np.bool_], body: Callable[[Tree], Tree], carry: Tree
+) -> Tree:
     if xp is jnp:
         return jax.lax.while_loop(condition, body, carry)
     while condition(carry):
@@ -172,28 +198,36 @@ def _while(xp: Any, condition: Any, body: Any, carry: Any) -> Any:
     return carry
 
 
-def _triangle(xp: Any, rows: Any) -> Any:
+def _triangle(xp: ModuleType, rows: Float[Numbers, "*lanes rows columns"]) -> Triangles:
     """The triangle of rows, with as many rows as columns."""
     missing = max(rows.shape[-1] - rows.shape[-2], 0)
     rows = xp.concatenate([rows, xp.zeros((*rows.shape[:-2], missing, rows.shape[-1]), rows.dtype)], axis=-2)
     return xp.linalg.qr(rows, mode="r")
 
 
-def _half_squares(triangle: Any) -> Any:
+def _half_squares(triangle: Triangles) -> EachLane:
     return 0.5 * (triangle[..., -1] ** 2).sum(axis=-1)
 
 
-def _times(matrix: Any, vector: Any) -> Any:
+def _times(
+    matrix: Float[Numbers, "*lanes rows columns"], vector: Float[Numbers, "*lanes columns"]
+) -> Float[Numbers, "*lanes rows"]:
     return (matrix @ vector[..., None])[..., 0]
 
 
-def _decrease(triangle: Any, step: Any) -> Any:
+def _decrease(triangle: Triangles, step: Unknowns) -> EachLane:
     """Predicted decrease of half the sum of squares over a step."""
     q = triangle[..., :-1, -1]
     return 0.5 * ((q**2).sum(axis=-1) - ((_times(triangle[..., :-1, :-1], step) + q) ** 2).sum(axis=-1))
 
 
-def _damped_step(xp: Any, state: State, step_size: Any, lower: Any, upper: Any) -> Any:
+def _damped_step(
+    xp: ModuleType,
+    state: State,
+    step_size: EachLane,
+    lower: Unknowns,
+    upper: Unknowns,
+) -> Unknowns:
     """Min ‖R d + q‖² + ‖D d‖² λ/step_size within limits of d and of C d; NaN where there is none.
 
     A coordinate that would leave its limits is put on the nearer one, and the rest is solved again. Limits of C d
@@ -208,7 +242,7 @@ def _damped_step(xp: Any, state: State, step_size: Any, lower: Any, upper: Any) 
     low = xp.concatenate([xp.broadcast_to(lower, scale.shape), state.least], axis=-1)
     high = xp.concatenate([xp.broadcast_to(upper, scale.shape), xp.full_like(state.least, np.inf)], axis=-1)
 
-    def solved(held: Any, at: Any) -> Any:
+    def solved(held: Numbers, at: Numbers) -> Numbers:
         coordinates, rows, values = held[..., :n], held[..., n:], xp.where(held[..., :n], at[..., :n], 0.0)
         firmly = xp.where(rows, firm, 0.0)
         blocks = [
@@ -221,7 +255,7 @@ def _damped_step(xp: Any, state: State, step_size: Any, lower: Any, upper: Any) 
         reduced = xp.linalg.qr(xp.concatenate([matrix, target[..., None]], axis=-1), mode="r")
         return _back_substituted(xp, reduced[..., :n, :n], reduced[..., :n, n])
 
-    def body(carry: tuple[Any, ...]) -> tuple[Any, ...]:
+    def body(carry: _Carry) -> _Carry:
         held, at, _, _ = carry
         step = solved(held, at)
         both = xp.concatenate([step, _times(conditions, step)], axis=-1)
@@ -232,7 +266,9 @@ def _damped_step(xp: Any, state: State, step_size: Any, lower: Any, upper: Any) 
     return xp.clip(_while(xp, lambda carry: carry[3], body, begin)[2], lower, upper)
 
 
-def _back_substituted(xp: Any, triangle: Any, right: Any) -> Any:
+def _back_substituted(
+    xp: ModuleType, triangle: Float[Numbers, "*lanes unknowns unknowns"], right: Unknowns
+) -> Unknowns:
     """X of R x = b; NaN where R is singular."""
     if xp is jnp:
         return jax.scipy.linalg.solve_triangular(triangle, right)

@@ -6,7 +6,8 @@ takes longer to compile than the forces of most laws. `optimistix.least_squares`
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from types import ModuleType
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -15,11 +16,21 @@ import lineax as lx
 import numpy as np
 import optimistix as optx
 from jax.flatten_util import ravel_pytree
-from jaxtyping import Float, Int
+from jaxtyping import Array, Float, Int, PyTree
 
 from jaxdamp._status import Status
 from jaxdamp._triangles import triangle
-from jaxdamp.solve.damped_steps import AT_EDGE, Linearisation, Rules, State, at_edges, judged, where, with_proposal
+from jaxdamp._types import ScalarLike
+from jaxdamp.solve.damped_steps import (
+    AT_EDGE,
+    Linearisation,
+    Rules,
+    State,
+    at_edges,
+    judged,
+    where,
+    with_proposal,
+)
 
 
 class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
@@ -65,18 +76,25 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
     ([2.692, 1.2], True)
     """
 
-    lower: Any = -np.inf
-    upper: Any = np.inf
-    conditions: Callable[[Any], Any] | None = None
+    lower: PyTree = -np.inf
+    upper: PyTree = np.inf
+    conditions: Callable[[PyTree], Array] | None = None
     tolerance: float = 1e-4
-    level: Any = 1.0
+    level: ScalarLike = 1.0
     precision: float | None = None
     rtol: float = 1e-6
     atol: float = 1e-9
-    norm: Callable[[Any], Any] = optx.max_norm
+    norm: Callable[[PyTree], Array] = optx.max_norm
 
     def init(
-        self, fn: Any, y: Any, args: Any, options: dict[str, Any], f_struct: Any, aux_struct: Any, tags: Any
+        self,
+        fn: Callable,
+        y: PyTree,
+        args: PyTree,
+        options: dict,
+        f_struct: PyTree,
+        aux_struct: PyTree,
+        tags: frozenset,
     ) -> State:
         """The state before the start has been evaluated."""
         if "linearise" in options:
@@ -106,23 +124,23 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         )
 
     def step(
-        self, fn: Any, y: Any, args: Any, options: dict[str, Any], state: State, tags: Any
-    ) -> tuple[Any, State, Any]:
+        self, fn: Callable, y: PyTree, args: PyTree, options: dict, state: State, tags: frozenset
+    ) -> tuple[PyTree, State, PyTree]:
         """Evaluate the point to be tried, accept or refuse it, and choose the next."""
         if "linearise" in options:
             xp, flat, unravel = np, y, lambda flat: flat
             here, aux = options["linearise"](state.trial, args)
         else:
             xp, (flat, unravel) = jnp, ravel_pytree(y)
-            here, aux = _linearised(self, lambda flat: fn(unravel(flat), args), state.trial, unravel)
+            here, aux = _linearised(self, lambda flat: fn(unravel(flat), args), jnp.asarray(state.trial), unravel)
         accepted, state = judged(xp, state, here, aux)
-        flat = where(xp, accepted, state.trial, flat)
-        state = with_proposal(xp, rules_of(self, xp, y), state, flat, here.samples, accepted)
-        return unravel(flat), state, state.aux
+        point: PyTree = where(xp, accepted, state.trial, flat)
+        state = with_proposal(xp, rules_of(self, xp, y), state, point, here.samples, accepted)
+        return unravel(point), state, state.aux
 
     def terminate(
-        self, fn: Any, y: Any, args: Any, options: dict[str, Any], state: State, tags: Any
-    ) -> tuple[Any, optx.RESULTS]:
+        self, fn: Callable, y: PyTree, args: PyTree, options: dict, state: State, tags: frozenset
+    ) -> tuple[PyTree, optx.RESULTS]:
         """Whether a search has ended, by its tolerance or because there is no step."""
         done = state.converged | state.stuck
         if "linearise" in options:
@@ -130,8 +148,16 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         return done, optx.RESULTS.where(state.stuck, optx.RESULTS.nonfinite, optx.RESULTS.successful)
 
     def postprocess(
-        self, fn: Any, y: Any, aux: Any, args: Any, options: dict[str, Any], state: State, tags: Any, result: Any
-    ) -> tuple[Any, Any, dict[str, Any]]:
+        self,
+        fn: Callable,
+        y: PyTree,
+        aux: PyTree,
+        args: PyTree,
+        options: dict,
+        state: State,
+        tags: frozenset,
+        result: optx.RESULTS,
+    ) -> tuple[PyTree, PyTree, dict[str, object]]:
         """Unknowns very near their lower bound end on it."""
         flat, unravel = ravel_pytree(y)
         return unravel(at_edges(flat, rules_of(self, jnp, y))), aux, {}
@@ -149,17 +175,17 @@ class ImplicitWithinBounds(optx.AbstractAdjoint):
 
     linear_solver: lx.AbstractLinearSolver = lx.AutoLinearSolver(well_posed=None)
 
-    def apply(self, primal_fn: Any, rewrite_fn: Any, inputs: Any, tags: frozenset[object]) -> Any:
+    def apply(self, primal_fn: Callable, rewrite_fn: Callable, inputs: PyTree, tags: frozenset) -> PyTree:
         """The solution, with these derivatives in place of those of the loop."""
         return optx.ImplicitAdjoint(self.linear_solver).apply(primal_fn, _pull_within_bounds, inputs, tags)
 
 
-def _pull_within_bounds(optimum: Any, _: Any, inputs: Any) -> Any:
+def _pull_within_bounds(optimum: PyTree, _: PyTree, inputs: PyTree) -> PyTree:
     """What is zero at the solution: the gradient, or the distance from a bound."""
     fn, solver, _, args, *_ = inputs
     flat, unravel = ravel_pytree(optimum)
 
-    def residual(flat: Any) -> tuple[Any, Any]:
+    def residual(flat: Array) -> tuple[Array, Array]:
         missed = ravel_pytree(fn(unravel(flat), args)[0])[0]
         return missed, missed
 
@@ -173,7 +199,7 @@ def _pull_within_bounds(optimum: Any, _: Any, inputs: Any) -> Any:
     return unravel(pull)
 
 
-def rules_of(solver: BoundedLevenbergMarquardt, xp: Any, like: Any) -> Rules:
+def rules_of(solver: BoundedLevenbergMarquardt, xp: ModuleType, like: PyTree) -> Rules:
     """The rules of a solver, with its bounds as vectors like some unknowns."""
     if xp is np:
         lower, upper = solver.lower, solver.upper
@@ -190,10 +216,15 @@ def rules_of(solver: BoundedLevenbergMarquardt, xp: Any, like: Any) -> Rules:
     return Rules(lower, upper, solver.tolerance, precision, solver.rtol, solver.atol)
 
 
-def _linearised(solver: BoundedLevenbergMarquardt, fn: Any, flat: Any, unravel: Any) -> tuple[Linearisation, Any]:
+def _linearised(
+    solver: BoundedLevenbergMarquardt,
+    fn: Callable[[Array], PyTree],
+    flat: Array,
+    unravel: Callable[[Array], PyTree],
+) -> tuple[Linearisation, PyTree]:
     """The problem at a point, inside JAX."""
 
-    def residual(flat: Any) -> tuple[Any, Any]:
+    def residual(flat: Array) -> tuple[Array, PyTree]:
         missed, aux = fn(flat)
         missed = ravel_pytree(missed)[0]
         return missed, (missed, aux)
@@ -208,7 +239,7 @@ def _linearised(solver: BoundedLevenbergMarquardt, fn: Any, flat: Any, unravel: 
     return Linearisation(rows, margins, slopes, missed.size), aux
 
 
-Linearise = Callable[[Float[np.ndarray, "some unknowns"], Int[np.ndarray, " some"]], tuple[Linearisation, Any]]
+Linearise = Callable[[Float[np.ndarray, "some unknowns"], Int[np.ndarray, " some"]], tuple[Linearisation, PyTree]]
 
 
 class SearchLanes(NamedTuple):
@@ -222,7 +253,7 @@ class SearchLanes(NamedTuple):
     """
 
     y: Float[np.ndarray, "lanes unknowns"]
-    aux: Any
+    aux: PyTree
     status: list[Status]
     steps: Int[np.ndarray, " lanes"]
 
@@ -252,18 +283,18 @@ def least_squares_on_host(
     """
     options, none = {"linearise": linearise}, frozenset[object]()
     y = np.array(start, np.float64)
-    state = solver.init(None, y, None, options, None, None, none)
-    y = state.trial
+    state = solver.init(linearise, y, None, options, None, None, none)
+    y = np.asarray(state.trial)
     while True:
-        ended, _ = solver.terminate(None, y, None, options, state, none)
+        ended, _ = solver.terminate(linearise, y, None, options, state, none)
         lanes = np.flatnonzero(~ended & (state.steps < max_steps))
         if not lanes.size:
             break
         if lanes.size == len(y):
-            y, state, _ = solver.step(None, y, lanes, options, state, none)
+            y, state, _ = solver.step(linearise, y, lanes, options, state, none)
             continue
         some = jtu.tree_map(lambda leaf: leaf[lanes], state)  # noqa: B023
-        some_y, some, _ = solver.step(None, y[lanes], lanes, options, some, none)
+        some_y, some, _ = solver.step(linearise, y[lanes], lanes, options, some, none)
         y, state = _put(lanes, (some_y, some), (y, state))
     edged = at_edges(y, rules_of(solver, np, y))
     lanes = np.flatnonzero(np.any(edged != y, axis=1))
@@ -271,10 +302,10 @@ def least_squares_on_host(
     if lanes.size:
         y, aux = edged, _put(lanes, linearise(edged[lanes], lanes)[1], aux)
     status = map(_status, state.converged, state.stuck)
-    return SearchLanes(y, aux, list(status), state.steps)
+    return SearchLanes(y, aux, list(status), np.asarray(state.steps))
 
 
-def _put(lanes: Int[np.ndarray, " some"], some: Any, tree: Any) -> Any:
+def _put(lanes: Int[np.ndarray, " some"], some: PyTree, tree: PyTree) -> PyTree:
     """A tree with the leaves of some lanes replaced."""
 
     def replaced(part: np.ndarray, leaf: np.ndarray) -> np.ndarray:

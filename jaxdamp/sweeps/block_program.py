@@ -124,6 +124,8 @@ class BlockProgram(AbstractWork):
 
     def dataset(self, store: BlockStore) -> Dataset:
         """The labelled results in a store, read when they are asked for."""
+        import xarray
+
         from jaxdamp.sweeps import accessor  # noqa: F401  (gives datasets their `.jaxdamp`)
 
         points = self._computation.points
@@ -131,7 +133,11 @@ class BlockProgram(AbstractWork):
         data = store.dataset((*listed, "failed", "reason"))
         if self._computation.traced.slopes:
             data = data.assign_coords({PARAMETER: (PARAMETER, np.array(points.names))})
-        return data[list(self._computation.traced.results)]
+        axes = [name for name in points.names if name in data.coords]  # in their order, which a folder does not keep
+        results = {name: data.variables[name] for name in self._computation.traced.results}
+        others = [str(name) for name in data.coords if name not in axes]
+        coordinates = {name: data.variables[name] for name in [*axes, *sorted(others)]}
+        return xarray.Dataset(results, coordinates, data.attrs)
 
 
 @of_known_numbers

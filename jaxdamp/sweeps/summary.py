@@ -1,7 +1,7 @@
 """Sweeps of which statistics, histograms, the best points and Pareto sets are kept instead of all results."""
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import final
 
@@ -165,9 +165,9 @@ class SummaryStore(AbstractStore):
         """The blocks that are not done."""
         return self._texts.left()
 
-    def repair(self) -> int:
-        """Mark blocks whose text is damaged as not done; gives how many."""
-        return self._texts.repair()
+    def repair(self, numbers: Iterable[int]) -> int:
+        """Mark those of some blocks whose text is damaged as not done; gives how many."""
+        return self._texts.repair(numbers)
 
     def write(self, number: int, values: Mapping[str, np.ndarray]) -> None:
         """Gather the results of a block, and write that."""
@@ -198,8 +198,9 @@ class HeldSummary(AbstractStore):
         """All blocks."""
         return np.arange(self.blocks.count)
 
-    def repair(self) -> int:
+    def repair(self, numbers: Iterable[int]) -> int:
         """Nothing can be damaged."""
+        del numbers
         return 0
 
     def write(self, number: int, values: Mapping[str, np.ndarray]) -> None:

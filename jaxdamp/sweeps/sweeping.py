@@ -107,7 +107,8 @@ def sweep(
         summary: what is kept instead of all results: statistics, and the histograms, best points and Pareto set that a
             `sweeps.Summary` names, gathered block by block, so that 1e9 points take the memory of a block. A `.zarr`
             store then has one text for each block.
-        progress: called with the number of points done and of all points; a line in the terminal if it is left out.
+        progress: called with the number of points done and of all points, of this part in an array job; a line in the
+            terminal if it is left out.
 
     Returns:
         The results by name with the axes as dimensions (for a list, along `point`). Of a `Ride`, `attrs["loop"]` says

@@ -1,5 +1,6 @@
 """`minimise`: tune the free parameters of a vehicle for a ride metric, by exact gradients."""
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any, Unpack
 
@@ -12,6 +13,8 @@ from jaxdamp._tables import typeset_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, MetricValues
 from jaxdamp.solve import Evaluation
+from jaxdamp.tune.combinations import Combinations, beside_next
+from jaxdamp.tune.combining import Driven, every_combination, rank
 from jaxdamp.tune.descending import Descent, Ended, missed, reached
 from jaxdamp.tune.limits import Limit, LimitEnd, limit_ends
 from jaxdamp.tune.measuring import ride_on
@@ -117,7 +120,8 @@ def minimise(
     task.refuse_constant(evaluations[0])
     with Progress("Tuning") as shown:
         progress = progress or (lambda step, value: shown(f"step {step}, {name} {value:.5g}"))
-        descent = Descent(evaluator, max_steps, progress)
+        combining = every_combination(evaluator, progress)
+        descent = combining or Descent(evaluator, max_steps, progress)
         several = descent.search(starts, evaluations, limits)
         ended = _best(descent, several, limits)
         attempts = _attempts(task, starts, several, limits) if len(several) > 1 else ()
@@ -133,26 +137,35 @@ def minimise(
             result = _result(
                 evaluator, evaluations[0], ended, attempts, (limits, tighter), max_steps, fresh_roads, again
             )
-    return result
+    return (
+        result if combining is None else _beside_others(result, evaluator, combining.combinations(tighter), fresh_roads)
+    )
 
 
-def _best(descent: Descent, several: Sequence[Ended], limits: Sequence[Limit]) -> Ended:
+def _beside_others(
+    result: TuneResult[V], evaluator: Evaluator, combinations: Combinations, fresh_roads: int
+) -> TuneResult[V]:
+    """The result with all combinations that were driven, the best one beside the next."""
+    task = evaluator.task
+    if np.count_nonzero(combinations.met) > 1:
+        values = np.array([column[1] for column in combinations.choices.values()])
+        cars = task.space.free.build(jnp.asarray(values, task.space.free.values.dtype)), result.vehicle
+        name, drive = task.objective.name, driver(cars, task.objective.metrics, task.objective, task.run)
+        fresh = on_fresh_roads(drive, (cars, task.run), task.road, range(fresh_roads), {}, task.units, name)
+        text = beside_next(combinations, name, fresh)
+        combinations = dataclasses.replace(combinations, beside_next=text)
+    return dataclasses.replace(result, combinations=combinations)
+
+
+def _best(descent: Descent | Driven, several: Sequence[Ended], limits: Sequence[Limit]) -> Ended:
     """The search that ended best; of numbers that are choices, the best combination next to it."""
     task = descent.task
-    best = min(several, key=lambda one: _rank(task, one, limits))
+    best = min(several, key=lambda one: rank(task, one, limits))
     if not task.space.is_choice.any():
         return best
-    chosen = min(descent.choose(best, limits), key=lambda one: _rank(task, one, limits))
+    chosen = min(descent.choose(best, limits), key=lambda one: rank(task, one, limits))
     steps = chosen.history or (float(chosen.evaluation.rows[0]),)
     return chosen._replace(history=best.history + steps)
-
-
-def _rank(task: DesignTask[Any], ended: Ended, limits: Sequence[Limit]) -> tuple[float, float]:
-    """By how much limits are violated at the end of a search, and the metric there."""
-    values = task.numbers(ended.evaluation.values)
-    short = missed(limits, values, task.tolerance)
-    beyond = (max(-limit.margin(values[limit.name]), 0.0) for limit in short)
-    return float(sum(beyond)), values[task.objective.name]
 
 
 def _attempts(

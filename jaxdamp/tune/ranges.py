@@ -18,6 +18,7 @@ from jaxdamp.parameters import (
     free_parameters,
     match_paths,
     name_patterns,
+    named_parameters,
     parameters,
     weight,
 )
@@ -27,7 +28,8 @@ Pair = tuple[float, float]
 FACTOR = 3.0  # default factor by which a number may decrease or increase
 INSIDE = 1e-6  # distance from the open ends of a domain, relative to the unit of the coordinate
 DAMPERS = ("**damper.**",)  # what is tuned by default, as far as it is adjustable
-MOST_CHOICES = 6  # numbers of which all combinations of two neighbours are tried
+MOST_COMBINATIONS = 2000  # of choices, up to which all are driven if nothing else is free
+MOST_CHOICES = 6  # numbers of which otherwise all combinations of two neighbours are tried
 NO_BOUND = (-math.inf, math.inf)
 _ROUNDING = 1e-12  # of its unit, below which the end of a parameter is zero
 
@@ -146,11 +148,18 @@ def search_range(
     spans = {path: (one.values[0], one.values[-1]) if isinstance(one, Choice) else one for path, one in given.items()}
     rows = [_one_range(name, p, float(value), size, spans.get(p.path)) for name, p, value, size in numbers]
     lower, upper, origin = zip(*rows, strict=True)
-    choices = tuple(one if isinstance(one := given.get(p.path), Choice) else None for p in free.owners)
-    if (count := sum(one is not None for one in choices)) > MOST_CHOICES:
-        remedy = "Give bounds to the others, or tie numbers together."
-        _checks.refuse("over", f"have choices for up to {MOST_CHOICES} numbers", count, remedy)
+    choices = _choices(given, free)
     return SearchRange(coordinates, start, unit, np.array(lower), np.array(upper), origin, choices, undetermined)
+
+
+def _choices(given: Mapping[str, Pair | Choice], free: FreeParameters) -> tuple[Choice | None, ...]:
+    """The choice of each number, if it is one; refused where they are too many to be tried."""
+    choices = tuple(one if isinstance(one := given.get(p.path), Choice) else None for p in free.owners)
+    sizes = [len(one.values) for one in choices if one is not None]
+    if len(sizes) > MOST_CHOICES and (len(sizes) < len(choices) or math.prod(sizes) > MOST_COMBINATIONS):
+        must = f"have choices for up to {MOST_CHOICES} numbers, or choices alone with {MOST_COMBINATIONS} combinations"
+        _checks.refuse("over", must, len(sizes), "Give bounds to the others, or tie numbers together.")
+    return choices
 
 
 def start_points(space: SearchRange, count: int, seed: int) -> np.ndarray:
@@ -197,7 +206,7 @@ def _given(argument: str, bounds: Mapping[str, Any], free: FreeParameters) -> di
     if not isinstance(bounds, Mapping):
         remedy = "Write `{'damper.rate': (1000.0, 5000.0)}`."
         _checks.refuse(argument, "be a mapping of parameters to bounds", _checks.described(bounds), remedy)
-    every, leaders, by_path = [p.path for p in parameters(free.tree)], dict(free.ties), {}
+    every, leaders, by_path = [p.path for p in named_parameters(free.tree, bounds)], dict(free.ties), {}
     paths = [p.path for p in free.chosen]
     for name, bound in bounds.items():
         named = [leaders.get(path, path) for path in match_paths(every, [name])]
@@ -238,7 +247,8 @@ def _one_range(
         _checks.refuse(name, f"start between {given[0]:g} and {given[1]:g} [{p.unit or '-'}]", value, remedy)
     low, high = _default(p, value) if given is None else given
     source = "default" if given is None else "given"
-    edges = p.domain.lower + INSIDE * unit, p.domain.upper - INSIDE * unit
+    inside = 0.0 if p.command else INSIDE * unit
+    edges = p.domain.lower + inside, p.domain.upper - inside
     where = source if low > edges[0] else "domain", source if high < edges[1] else "domain"
     return min(max(low, edges[0]), value), max(min(high, edges[1]), value), where
 
@@ -247,10 +257,10 @@ def _default(p: Parameter, value: float) -> Pair:
     """The default range, in proportion to the start.
 
     One third to three times the start for numbers of one sign (rates, forces, velocities, exponents, knots); the same
-    distance below the start as above it for numbers of either sign (coefficients, offsets); no bound if the start is
-    zero or has no meaning, as for the weights of a network.
+    distance below the start as above it for numbers of either sign (coefficients, offsets); no bound but the domain if
+    the start is zero or has no meaning, as for the weights of a network, and for commands between levels.
     """
-    if value == 0.0 or p.domain == weight:
+    if value == 0.0 or p.domain == weight or (p.command and math.isfinite(p.domain.upper)):
         return NO_BOUND
     keeps_sign = p.domain.lower >= 0.0 or p.domain.upper <= 0.0 or p.domain.ordered
     far = FACTOR * value

@@ -15,6 +15,7 @@ from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, typeset_unit, with_unit
 from jaxdamp._types import Figure
+from jaxdamp.tune.combinations import Combinations
 from jaxdamp.tune.limits import LimitRange, written
 from jaxdamp.tune.objective import Objective, Targets
 from jaxdamp.tune.ranges import Change
@@ -99,6 +100,7 @@ class TuneResult(AbstractResult, Generic[V]):
         tolerances: the effect of the scatter of each parameter on the metric, at the tuned vehicle, of `robust`.
         relaxation: which limit, relaxed by how much, would make the metric 1 % smaller, on the road of the tuning and
             to first order; where limits are not met, those that the search could have met. In words, empty without.
+        combinations: of choices, each driven, if nothing else was free.
     """
 
     vehicle: V
@@ -126,6 +128,7 @@ class TuneResult(AbstractResult, Generic[V]):
     elsewhere: str = ""
     tolerances: tuple[ToleranceEffect, ...] = ()
     relaxation: str = ""
+    combinations: "Combinations | None" = None
 
     @property
     def verdict(self) -> Verdict:
@@ -159,9 +162,12 @@ class TuneResult(AbstractResult, Generic[V]):
         few = len(at_bounds) <= NAMED
         stops += at_bounds if few else [f"{len(at_bounds)} of {len(self.parameters)} parameters at their bounds"]
         stops = [*(f"{name} beyond its limit" for name in self.violated), *stops]
-        state = "an optimum" if self.converged else "not an optimum"
         stops += [f"no effect of {name}" for name in self.without_effect]
-        parts = [f"{state} after {len(self.history)} steps", *stops, *[inside] * bool(inside)]
+        if self.combinations is not None:
+            parts = [self.combinations.sentence, *stops]
+        else:
+            state = "an optimum" if self.converged else "not an optimum"
+            parts = [f"{state} after {len(self.history)} steps", *stops, *[inside] * bool(inside)]
         text = f"{self.metric} {before:.4g} -> {after:.4g} {unit}{share}: {', '.join(parts)}."
         return " ".join(filter(None, (f"{text}{self._extremes}", self.relaxation)))
 
@@ -270,10 +276,11 @@ class TuneResult(AbstractResult, Generic[V]):
         return Table(f"What the scatter of parameters costs {self.metric}", columns, tuple(rows))
 
     def tables(self) -> dict[str, Table]:
-        """Metrics and parameters before and after; metrics in every scenario, and effects of tolerances, if any."""
+        """Metrics and parameters before and after; combinations, metrics in every scenario, tolerances, if any."""
         several = {} if self.scenarios is None else {"scenarios": self.scenario_table()}
         tolerances = {"tolerances": self.tolerance_table()} if self.tolerances else {}
-        return {"metrics": self.table(), "parameters": self.parameter_table()} | several | tolerances
+        driven = {"combinations": self.combinations.table()} if self.combinations else {}
+        return {"metrics": self.table(), "parameters": self.parameter_table()} | driven | several | tolerances
 
     def content(self) -> dict[str, Any]:
         """The tuning as numbers with units and words, ready for JSON; numbers that are not finite are None."""
@@ -287,6 +294,7 @@ class TuneResult(AbstractResult, Generic[V]):
             },
             "limits": {name: with_unit(limit, self.units[name]) for name, limit in self.limits.items()},
             "fresh": None if self.fresh is None else self.fresh.to_dict(),
+            "combinations": None if self.combinations is None else self.combinations.to_dict(),
         }
 
     def __repr__(self) -> str:

@@ -205,8 +205,8 @@ def _free(
 ) -> tuple[FreeParameters, FreeParameters]:
     """The parameters of the vehicle, and the same of the vehicle with hats, with the forces of the hats."""
     of_vehicle = free_parameters(vehicle, over=name_patterns("over", over), freeze=freeze)
-    paths = [p.path for p in parameters(vehicle)]
-    moved = [p.path for p in parameters(hatted)]
+    paths = [p.path for p in parameters(vehicle, commands=True)]
+    moved = [p.path for p in parameters(hatted, commands=True)]
     hats = [path for path in moved if is_hat(path, hatted)]
     places = dict(zip(paths, [path for path in moved if path not in hats], strict=True))
     exact = [places[path] for path in match_paths(paths, [p.path for p in of_vehicle.chosen])]

@@ -24,7 +24,7 @@ from tests.cli.invoking import jaxdamp, refused
 
 
 NUMBER = re.compile(r"-?\d[\d.]*(?:e[-+]?\d+)?")
-NUMBERS = ("best_law.json", "laws/*.json", "law.json", "vehicle.json", "tuning.json", "settings.json", "**/*.csv")
+NUMBERS = ("best_law.json", "laws/*.json", "law.json", "vehicle.json", "tuning.json", "**/*.csv")
 TUNE = ["tune", "quarter_car_000", "iso:C", "--duration", "1", "--fresh-roads", "8"]
 
 

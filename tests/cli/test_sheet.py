@@ -35,14 +35,18 @@ def test_a_sheet_becomes_a_family_and_a_best_click(sheet: Path, monkeypatch: pyt
         and (folder / "fit/laws/3.json").is_file()
     )
     ride = ("quarter_car_000", "iso:A", "--start", folder / "fit/best_law.json", "--duration", "1")
-    said = jaxdamp("tune", *ride, "--limit", "grip=+20%", "--out", folder / "tune").output
-    assert "The best setting is" in said and "the next, on one road: --roads 4 says" in " ".join(said.split())
-    several = jaxdamp("tune", *ride, "--limit", "grip=+20%", "--roads", "2", "--out", folder / "two").output
-    assert "over 2 roads" in " ".join(several.split())
+    few = ("--fresh-roads", "2")
+    said = " ".join(jaxdamp("tune", *ride, *few, "--limit", "grip=+20%", "--out", folder / "tune").output.split())
+    assert "the best of 3 combinations" in said and "beside the next, damper.command = " in said and "2 fresh" in said
     assert "Shown in units metric" in said and "(from jaxdamp.toml)" in said
-    assert float(from_json(folder / "tune/law.json").command) in (1.0, 2.0, 3.0)
-    none = jaxdamp("tune", *ride, "--limit", "grip=0.001", "--out", folder / "none", code=1).output
-    assert "No setting meets the limits" in none
+    rows = list(csv.DictReader((folder / "tune/combinations.csv").read_text().splitlines()))
+    assert float(from_json(folder / "tune/law.json").command) == float(rows[0]["damper.command"])
+    assert {float(row["damper.command"]) for row in rows} == {1.0, 2.0, 3.0}
+    name = next(name for name in rows[0] if name.startswith("weighted_rms_sprung_acceleration"))
+    comfort = [float(row[name]) for row in rows if row["limits"] == "met"]
+    assert comfort == sorted(comfort) and len(comfort) > 1
+    none = jaxdamp("tune", *ride, *few, "--limit", "grip=0.001", "--out", folder / "none", code=1).output
+    assert "Limit not met" in none and "of 3 the nearest to the limits" in " ".join(none.split())
 
 
 def test_what_says_nothing_of_a_sheet_is_refused(sheet: Path) -> None:

@@ -216,6 +216,12 @@ WRONG = [
     (["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--limit", "grip=1in"], "in a unit of grip"),
     (["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--limit", "grip"], "must read like NAME=VALUE"),
     (["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--limit", "grip=2:1"], "in increasing order"),
+    (["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--block", "0/200"], "but is '0/200'. Number the"),
+    (
+        ["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--block", "201/200"],
+        "parts from 1: in an array job",
+    ),
+    (["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--block", "a/b"], "--block must be a part such as"),
 ]
 FILES = {
     "BAD": "preset = ",

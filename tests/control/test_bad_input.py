@@ -63,7 +63,7 @@ def test_commands_that_stay_at_a_limit_are_said():
         ),
         (lambda: Ride(_delayed(2.0), ROAD, duration=1.0), "No command of the controller would be applied"),
         (lambda: Ride(_delayed(0.0), ROAD, duration=1.0)({"car.damper.levels.1": 2.0}), "levels"),
-        (lambda: _command(1.5), "`command` must be between the levels 0 and 1, but is 1.5"),
+        (lambda: _command(1.5), "`Scheduled.command` must be between 0 and 1, but is 1.5"),
         (lambda: Controlled(quarter(Linear(1e3)), Skyhook()), "which takes a command"),
         (
             lambda: simulate(Controlled(QUARTER, Skyhook(), period=7.5e-4), ROAD, duration=1.0),

@@ -124,7 +124,7 @@ def test_a_command_beyond_the_records_is_warned_of():
     with pytest.warns(OutsideFittedRangeWarning, match="command 3.5, fitted to 0 to 2"):
         changed: Any = with_command(fitted, 3.5)
     assert changed.law.fitted_to == fitted.law.fitted_to
-    with pytest.raises(ValueError, match="between the levels 0 and 4"):
+    with pytest.raises(ValueError, match="between 0 and 4"):
         with_command(fitted, 5.0)
     with pytest.warns(OutsideFittedRangeWarning, match="command 5"):
         with_command(with_fitted_range(ModifiedBoucWen.prototype(), command=(0.0, 2.0)), 5.0)

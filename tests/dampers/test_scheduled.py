@@ -80,9 +80,9 @@ def test_batched_over_the_command():
 
 
 def test_refusals():
-    with pytest.raises(ValueError, match=r"`command` must be between the levels 0 and 1, but is 1.5"):
+    with pytest.raises(ValueError, match=r"`Scheduled.command` must be between 0 and 1, but is 1.5"):
         Scheduled((Linear(1.0), Linear(2.0)), [0.0, 1.0], 1.5)
-    with pytest.raises(ValueError, match="between the levels 0 and 1"):
+    with pytest.raises(ValueError, match="between 0 and 1"):
         with_command(Lag(Scheduled((Linear(1.0), Linear(2.0)), [0.0, 1.0], 0.0), 0.01), -0.1)
     with pytest.raises(ValueError, match="`laws` must be of equal structure"):
         Scheduled((Linear(1.0), Bilinear(2.0, 1.0)), [0.0, 1.0], 0.0)
@@ -133,7 +133,7 @@ def test_records_must_all_state_the_command(runs):
     with pytest.raises(ValueError, match="`runs` must all state their command, but is without one: bare"):
         identify.fit(start, [*runs, bare])
     outside = BenchRun("hot", run.time, run.stroke, run.velocity, run.force, command=1.2)
-    with pytest.raises(ValueError, match="between the levels 0 and 1"):
+    with pytest.raises(ValueError, match="between 0 and 1"):
         identify.fit(start, [*runs, outside])
 
 

@@ -8,7 +8,16 @@ import pytest
 
 from jaxdamp import respond
 from jaxdamp.bench import BenchRun, SineTest, VirtualDyno
-from jaxdamp.dampers import CoulombFriction, GasSpring, MonoTube, PiecewiseLinear, Scheduled, Spring, with_command
+from jaxdamp.dampers import (
+    CoulombFriction,
+    GasSpring,
+    MonoTube,
+    PiecewiseLinear,
+    Scheduled,
+    Spring,
+    TwinTube,
+    with_command,
+)
 from jaxdamp.identify import fit, fit_scheduled
 from jaxdamp.parameters import get, replace
 from jaxdamp.rig import Rig
@@ -27,7 +36,7 @@ def at(
     pressure: float, seed: int, damper=DAMPER, zero: float = 0.0, tests=TESTS, rate: float = 200.0
 ) -> list[BenchRun]:
     """Records at a gas pressure, which they state in bar and have as command in Pa."""
-    name = "gas.pressure" if isinstance(damper, MonoTube) else "terms.1.pressure"
+    name = "gas.pressure" if isinstance(damper, MonoTube | TwinTube) else "terms.1.pressure"
     dyno = VirtualDyno(replace(damper, {name: pressure}), rate, force_noise=NOISE, seed=seed)
     settings = {name.replace("terms.1.", ""): f"{pressure / 1e5:g} bar"}
     return [
@@ -133,3 +142,20 @@ def test_a_cavity_follows_the_pressure_too():
             assert score.fit_percent > 96.0
     cavity = at(3e5, 9, tube, tests=fast[:1], rate=1000.0)[0]
     assert result.score(dataclasses.replace(cavity, settings={"gas.pressure": "20 bar"}))[1] > 100.0  # N, without them
+
+
+@pytest.mark.slow
+def test_a_twin_tube_between_and_beyond_the_pressures():
+    tube = TwinTube.reference()
+    tests = [SineTest(0.05, 0.1, cycles=1), SineTest(0.03, 1.6, cycles=3), SineTest(0.005, 10.0, cycles=6)]
+    runs = [run for k, p in enumerate((3e5, 1.2e6)) for run in at(p, k, tube, zero=20.0, tests=tests, rate=1000.0)]
+    geometry = {"piston_diameter": 0.05, "rod_diameter": 0.0206, "rebound_volume": 3.3e-4, "compression_volume": 3.9e-4}
+    held = ["exponent", "base.rebound_*", "piston.compression_opening_pressure"]
+    start = functools.partial(TwinTube.guess, **geometry)
+    result = fit(start, runs, freeze=held, rig="offset", starts=1, max_steps=100)
+    np.testing.assert_allclose(result["rod_area"].value, 3.1416e-4, rtol=0.005)  # from a rod 3 % too thick
+    np.testing.assert_allclose(result["force_offset"].value, 20.0, atol=2.0)
+    others = [SineTest(0.02, 0.5, cycles=2), SineTest(0.01, 5.0, cycles=4)]
+    for pressure in (1.5e5, 6e5, 2e6):
+        for score in result.score(at(pressure, 9, tube, zero=20.0, tests=others, rate=1000.0))[2]:
+            assert score.fit_percent > 98.5, (pressure, score)

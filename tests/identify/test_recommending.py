@@ -58,7 +58,7 @@ def test_refits_from_the_common_optimum_are_those_from_the_start(law):
 def test_velocities_that_one_record_alone_reaches_count_too():
     truth = SeriesSpring(PiecewiseLinear([-0.3, -0.08, 0.08, 0.3], [4300.0, 530.0, 770.0, 870.0, 2700.0]), 4.1e5)
     tests = [SineTest(0.004, 1.8, cycles=4), SineTest(0.006, 0.9, cycles=4), SineTest(0.024, 4.0, cycles=8)]
-    runs = list(VirtualDyno(truth, sampling_rate=400.0, force_noise=20.0).run(tests))
+    runs = list(VirtualDyno(truth, sampling_rate=200.0, force_noise=20.0).run(tests))
     comparison = compare(identify.default_ladder(runs, ["polynomial", "series_spring_dahl"]), runs)
     assert comparison.best.name.startswith("series_spring_dahl")
     percent = {rung.name: rung.held_out_fit_percent or 0.0 for rung in comparison.rungs}

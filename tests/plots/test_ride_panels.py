@@ -1,11 +1,15 @@
 """What sheets and sweeps show in numbers: gains, damping ratios, velocities of each damper, the present design."""
 
+import re
+
 import equinox as eqx
 import numpy as np
 import pytest
 import xarray
+from matplotlib.text import Text
 
 from jaxdamp import plots, roads, simulate
+from jaxdamp._display import Display, shown_in
 from jaxdamp.dampers import Bilinear, Linear
 from jaxdamp.plots import _ride_spectra, _rides
 from jaxdamp.simulation import Response
@@ -46,6 +50,27 @@ def test_a_sheet_of_a_level_road_is_refused(responses: dict[str, Response]) -> N
     still = eqx.tree_at(lambda response: response.road_rate, soft, np.zeros_like(soft.road_rate))
     with pytest.raises(ValueError, match=r"`rides` must be driven over a road that is not level .* but is still"):
         plots.ride_sheet({"soft": soft, "still": still})
+
+
+@pytest.mark.parametrize("shop", [Display("imperial"), Display("metric", "compression-positive"), Display()])
+def test_a_ride_sheet_of_a_shop_has_its_numbers(responses: dict[str, Response], shop: Display) -> None:
+    """Ticks stand where their numbers belong, in every panel over velocity; amounts in words have the same units."""
+    with shown_in(shop):
+        figure = plots.ride_sheet(responses)
+    over_velocity = [axes for axes in figure.axes if axes.get_xlabel().startswith("velocity")]
+    assert len(over_velocity) == 1
+    (axes,) = over_velocity
+    figure.canvas.draw()
+    unit, factor = shop.of("m/s").unit, shop.of("m/s", signed=True).factor
+    if unit == "m/s":
+        unit, factor = "mm/s", 1e3 * factor
+    assert f"[{unit}]" in axes.get_xlabel()
+    labels = [(text.get_position()[0], text.get_text()) for text in axes.get_xticklabels() if text.get_text()]
+    assert len(labels) > 2
+    for at, text in labels:
+        assert float(text.replace("−", "-")) == pytest.approx(factor * at, rel=1e-3, abs=1e-6)
+    words = " ".join(text.get_text() for text in figure.findobj(Text) if isinstance(text, Text))
+    assert bool(re.search(r"\d N\b", words)) == (shop.units != "imperial")
 
 
 def test_the_damping_ratio_is_the_secant_rate_over_critical_damping() -> None:

@@ -30,7 +30,7 @@ def oscillator(law: dampers.AbstractDamper, damping: float = 0.0) -> LumpedVehic
 
 def test_linear_vehicles_have_the_frequency_response_in_closed_form() -> None:
     """With the delay between two axles, amplitude by amplitude."""
-    for car, speed in ((quarter_car_000(), None), (half_car_002(), 12.0)):
+    for car, speed in ((half_car_002(), 12.0), (quarter_car_000(), None)):
         result = harmonic_response(car, FREQUENCY, np.array([[0.01], [0.03]]), speed=speed, substeps=32)
         exact = vehicles.frequency_response(car, FREQUENCY, speed=speed)
         assert all(status is Status.CONVERGED for status in result.status)
@@ -40,9 +40,8 @@ def test_linear_vehicles_have_the_frequency_response_in_closed_form() -> None:
             assert error < 1e-8 * scale, channel
             assert np.nanmax(np.asarray(result.distortion(channel))) < 1e-8
     poles = np.linalg.eigvals(np.asarray(vehicles.linearise(quarter_car_000()).state_matrix))
-    multipliers = harmonic_response(quarter_car_000(), [2.0], 0.01, substeps=32).multipliers[0]
-    largest = np.abs(np.exp(poles / 2.0)).max()
-    assert abs(multipliers[0]) == pytest.approx(largest, rel=1e-6)
+    largest = np.abs(np.exp(poles[:, None] / FREQUENCY)).max(axis=0)
+    np.testing.assert_allclose(np.abs(result.multipliers[..., 0]), [largest, largest], rtol=1e-6)
 
 
 def test_the_same_by_shooting_with_scipy() -> None:

@@ -338,8 +338,9 @@ def test_an_axis_without_effect_is_named_and_no_value_of_it_is_called_the_best()
     assert without_effect(jaxdamp.sweep(product, {"a": [1.0], "b": [2.0, 3.0]})) == {}
 
 
-def test_the_page_of_a_large_grid_has_its_first_points():
+@pytest.mark.parametrize("file", [None, "s.zarr"])
+def test_the_page_of_a_large_grid_has_its_first_points(tmp_path, file):
     axes = {name: np.linspace(1.0, 2.0, 11) for name in "abc"}
-    data = jaxdamp.sweep(lambda p: {"volume": p["a"] * p["b"] * p["c"]}, axes)
+    data = jaxdamp.sweep(lambda p: {"volume": p["a"] * p["b"] * p["c"]}, axes, file=file and tmp_path / file)
     page = sweep_report(data).to_html()
     assert page.count("<tr>") == 1 + MOST_POINTS and "the first 1000 of 1331 rows" in page

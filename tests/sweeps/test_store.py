@@ -58,6 +58,7 @@ def test_a_store_holds_what_a_sweep_gives(tmp_path, over):
     expected = jaxdamp.sweep(decay(), over, gradients=True)
     data = jaxdamp.sweep(decay(), over, gradients=True, file=tmp_path / "s.zarr")
     assert data.attrs["points_done"] == expected["failed"].size
+    assert [name for name in data.coords if name in AXES] == [*AXES]  # a folder does not keep their order
     xarray.testing.assert_identical(plain(data), expected)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import Ride, dampers, roads, sweep, tune, vehicles
-from jaxdamp.parameters import get
+from jaxdamp.parameters import free_parameters, get
 
 
 COMFORT, TYRE = "rms_sprung_acceleration", "rms_dynamic_tyre_load"
@@ -43,6 +43,40 @@ def test_what_is_free_beside_a_choice_is_best_for_it() -> None:
     assert found.after[COMFORT] <= swept[COMFORT].values.ravel()[allowed].min() * (1 + 1e-9)
 
 
+def test_clicks_are_chosen_and_swept() -> None:
+    """A valley between two hills: every click is driven, where a descent would end at the nearer hill."""
+    rates = [900.0, 2500.0, 1200.0, 300.0, 7000.0, 3500.0]
+    clicks = np.arange(1.0, 7.0)
+    law = dampers.Scheduled(tuple(map(dampers.Linear, rates)), levels=clicks, command=1.0)
+    car = vehicles.presets.quarter_car_000(law)
+    each = [Ride(vehicles.presets.quarter_car_000(dampers.Linear(rate)), WHITE)() for rate in rates]
+    comfort, tyre = (np.array([float(ride[name]) for ride in each]) for name in (COMFORT, TYRE))
+    swept = sweep(Ride(car, WHITE, metrics=[COMFORT]), {"command": clicks})
+    np.testing.assert_allclose(swept[COMFORT], comfort, rtol=1e-9)
+    with pytest.warns(UserWarning, match="damper.command must be between 1 and 6"):
+        assert sweep(Ride(car, WHITE, metrics=[COMFORT]), {"command": [0.5, 1.0]}).failed.values.sum() == 1
+    limit = float(np.sort(tyre)[2]) * 1.001  # three clicks meet it
+    over = {"damper.command": tune.Choice(clicks)}
+    result = tune.minimise(COMFORT, car, WHITE, over=over, limits={TYRE: limit})
+    order = [i for i in np.argsort(comfort) if tyre[i] <= limit] + [i for i in np.argsort(tyre) if tyre[i] > limit]
+    combinations = result.combinations
+    assert combinations is not None and combinations.choices["damper.command"].tolist() == clicks[order].tolist()
+    np.testing.assert_allclose(combinations.metrics[COMFORT], comfort[order], rtol=1e-9)
+    assert combinations.met.tolist() == [True] * 3 + [False] * 3
+    assert float(get(result.vehicle, "damper.command")) == order[0] + 1
+    gain = 100.0 * (comfort[order[0]] / comfort[order[1]] - 1.0)
+    beside = f"beside the next, damper.command = {order[1] + 1}: {gain:+.1f} %"
+    assert f"the best of 6 combinations, of which 3 within the limits, {beside}" in result.summary and result.converged
+    assert result.to_dict()["combinations"]["rows"][0]["limits"] == "met"
+    with pytest.raises(ValueError, match=r"No parameter is named 'damper.comand': did you mean 'damper.command'"):
+        tune.minimise(COMFORT, car, WHITE, over=["damper.comand"])
+    two = vehicles.presets.half_car_002(law)
+    tie, named = {"front.*.command": "rear.*.command"}, ["rear.damper.command"]
+    assert free_parameters(two, over=["**.command"], tie=tie).names == named != free_parameters(two, over=["**"]).names
+    between = tune.minimise(COMFORT, car, WHITE, over=["damper.command"])  # any current between two
+    assert between.parameters[0].lower == 1.0 and between.parameters[0].upper == 6.0
+
+
 def test_wrong_choices_are_refused() -> None:
     for values in ([1.0], [1.0, np.nan], 3.0, [1.0, 1.0], ["a", "b"]):
         with pytest.raises(ValueError, match="`values` must be two or more finite numbers"):
@@ -52,10 +86,10 @@ def test_wrong_choices_are_refused() -> None:
     with pytest.raises(ValueError, match="`over` must have bounds along a front"):
         tune.pareto([COMFORT, TYRE], CAR, WHITE, over={"rate": tune.Choice([2000.0, 4000.0])})
     law = dampers.PiecewiseLinear(np.array([-0.3, 0.1]), np.array([1500.0, 2500.0, 1500.0]))
-    many = dampers.PiecewiseLinear(np.linspace(-0.3, 0.3, 7), np.full(8, 2000.0))
+    many = dampers.PiecewiseLinear(np.linspace(-0.3, 0.3, 11), np.full(12, 2000.0))
     car, over = vehicles.presets.quarter_car_000(law), {"slopes": tune.Choice([1000.0, 3000.0])}
     bump = roads.cosine_bump(0.03, start=0.02, duration=0.1)
     result = tune.minimise(COMFORT, car, bump, over=over, max_steps=1, duration=0.3, dt=2e-3)
     assert {change.after for change in result.parameters} <= {1000.0, 3000.0}
-    with pytest.raises(ValueError, match="choices for up to 6 numbers, but is 8"):
+    with pytest.raises(ValueError, match="or choices alone with 2000 combinations, but is 12"):
         tune.minimise(COMFORT, vehicles.presets.quarter_car_000(many), WHITE, over={"slopes": tune.Choice([1e3, 3e3])})

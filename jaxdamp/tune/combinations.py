@@ -1,0 +1,74 @@
+"""Combinations of choices that a tuning has driven: the best of them, and the next best beside it."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import final
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from jaxdamp._tables import Column, Contents, Table, percent_change, plain
+from jaxdamp.tune.rescoring import Rescore
+
+
+@final
+@dataclasses.dataclass(frozen=True)
+class Combinations:
+    """All combinations of choices, the best first: those within the limits, then those least beyond them.
+
+    Attributes:
+        choices: the values of each number, in its unit, by its name.
+        metrics: of each combination, by name.
+        met: which combinations meet all limits.
+        units: of numbers and metrics.
+        beside_next: by how much the best differs from the next best, in words; empty where there is none.
+    """
+
+    choices: dict[str, Float[np.ndarray, " combinations"]]
+    metrics: dict[str, Float[np.ndarray, " combinations"]]
+    met: Bool[np.ndarray, " combinations"]
+    units: Mapping[str, str]
+    beside_next: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """How many combinations there are, and how the best one stands beside the next."""
+        count, met = len(self.met), int(np.count_nonzero(self.met))
+        within = "" if met == count else f", of which {met} within the limits"
+        first = f"the best of {count} combinations{within}"
+        return ", ".join(filter(None, (first if met else f"of {count} the nearest to the limits", self.beside_next)))
+
+    def at(self, place: int) -> str:
+        """One combination in words, the best being the first."""
+        return ", ".join(f"{name} = {values[place]:.6g}" for name, values in self.choices.items())
+
+    def table(self) -> Table:
+        """A row for each combination: its numbers, its metrics, and whether it meets the limits."""
+        columns = [Column(name, self.units[name]) for name in (*self.choices, *self.metrics)]
+        words = ["met" if ok else "not met" for ok in self.met]
+        rows = zip(*self.choices.values(), *self.metrics.values(), words, strict=True)
+        return Table("All combinations", (*columns, Column("limits")), tuple(rows))
+
+    def to_dict(self) -> Contents:
+        """The rows as plain data, ready for JSON."""
+        return {"sentence": self.sentence, "rows": plain(self.table().records())}
+
+
+def beside_next(combinations: Combinations, metric: str, fresh: Rescore | None) -> str:
+    """By how much the best combination differs from the next best, in words.
+
+    Arguments:
+        combinations: all of them.
+        metric: the minimised one.
+        fresh: the next best and the best on fresh roads, if there are any.
+    """
+    if fresh is None:
+        values = combinations.metrics[metric]
+        change = percent_change(values[1], values[0])
+        words = "" if change is None else f"{change:+.1f} %"
+    else:
+        half, mean = 100.0 * fresh.half_width(metric), 100.0 * float(np.mean(fresh.change(metric)))
+        error = f" ± {half:.1f}" if np.isfinite(half) else ""
+        unsure = "" if mean < -half else ", so that roads do not tell them apart"
+        words = f"{mean:+.1f}{error} % on {fresh.roads} fresh roads{unsure}"
+    return f"beside the next, {combinations.at(1)}: {words}"

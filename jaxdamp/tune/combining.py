@@ -1,0 +1,93 @@
+"""Every combination of choices, driven: the best of them, and the next best beside it."""
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, final
+
+import jax.numpy as jnp
+import numpy as np
+
+from jaxdamp.parameters import checked
+from jaxdamp.tune.combinations import Combinations
+from jaxdamp.tune.descending import Ended, missed
+from jaxdamp.tune.limits import Limit
+from jaxdamp.tune.measuring import LANES
+from jaxdamp.tune.ranges import MOST_COMBINATIONS
+from jaxdamp.tune.task import DesignTask, Evaluator
+
+
+@final
+class Driven:
+    """All combinations of the choices of a tuning, in place of a descent.
+
+    Attributes:
+        task: of the evaluator.
+        ends: a search that ends at each of them.
+    """
+
+    def __init__(self, evaluator: Evaluator, points: np.ndarray, progress: Callable[[int, float], None]) -> None:
+        self.task, self.ends, least = evaluator.task, list[Ended](), math.inf
+        for part in np.array_split(points, math.ceil(len(points) / LANES)):
+            evaluations = evaluator.at(part / self.task.space.unit)
+            least = min(least, *(float(one.rows[0]) for one in evaluations))
+            pairs = zip(part, evaluations, strict=True)
+            self.ends += [Ended(point, one, (), out_of_steps=False, slope_left=0.0) for point, one in pairs]
+            progress(len(self.ends), least)
+
+    def search(self, starts: object, evaluations: object, limits: Sequence[Limit]) -> list[Ended]:
+        """The end of a search, wherever it would start: the best combination."""
+        return [min(self.ends, key=lambda one: rank(self.task, one, limits))]
+
+    def choose(self, ended: Ended, limits: object) -> list[Ended]:
+        """That combination: there is none beside it to be tried."""
+        return [ended]
+
+    def combinations(self, limits: Sequence[Limit]) -> Combinations:
+        """All of them for the result, with the minimised and the limited metrics.
+
+        Arguments:
+            limits: of the search.
+        """
+        task, ends = self.task, sorted(self.ends, key=lambda one: rank(self.task, one, limits))
+        each = [task.numbers(one.evaluation.values) for one in ends]
+        names = dict.fromkeys([task.objective.name, *task.allowed])
+        owners = zip(task.space.free.names, task.space.free.owners, strict=True)
+        return Combinations(
+            dict(zip(task.space.free.names, np.transpose([one.values for one in ends]), strict=True)),
+            {name: np.array([numbers[name] for numbers in each]) for name in names},
+            np.array([not missed(limits, numbers, task.tolerance) for numbers in each]),
+            {name: task.units[name] for name in names} | {name: p.unit for name, p in owners},
+        )
+
+
+def every_combination(evaluator: Evaluator, progress: Callable[[int, float], None]) -> Driven | None:
+    """All combinations, driven, if choices are all that is free and there are not too many.
+
+    Arguments:
+        evaluator: of the task.
+        progress: called with the number of combinations driven and the least objective so far.
+    """
+    space = evaluator.task.space
+    choices = [choice.values for choice in space.choices if choice is not None]
+    if len(choices) < len(space.choices) or math.prod(map(len, choices)) > MOST_COMBINATIONS:
+        return None
+    points = np.array([point for point in itertools.product(*choices) if _is_allowed(evaluator.task, point)])
+    return Driven(evaluator, points, progress)
+
+
+def _is_allowed(task: DesignTask[Any], point: Sequence[float]) -> bool:
+    """Whether a vehicle can have these numbers."""
+    try:
+        checked(task.space.free.build(jnp.asarray(point, task.space.free.values.dtype)))
+    except ValueError:
+        return False
+    return True
+
+
+def rank(task: DesignTask[Any], ended: Ended, limits: Sequence[Limit]) -> tuple[float, float]:
+    """By how much limits are violated at the end of a search, and the metric there; infinite if it has none."""
+    numbers = task.numbers(ended.evaluation.values)
+    beyond = [max(-limit.margin(numbers[limit.name]), 0.0) for limit in missed(limits, numbers, task.tolerance)]
+    pair = float(sum(beyond)), numbers[task.objective.name]
+    return (math.inf, math.inf) if any(map(math.isnan, pair)) else pair
