@@ -224,7 +224,7 @@ class VirtualDyno:
         machine = [
             described(p.path, p.value, p.unit)
             for p, q in zip(parameters(self.rig), parameters(Rig()), strict=True)
-            if p.value != q.value
+            if float(p.value) != float(q.value)
         ]
         faults = [f"sampled at {self.sampling_rate:g} Hz", *self.sensors.described(), *machine, f"seed {self.seed}"]
         return f"made by the virtual dyno from {type(self.law).__name__}: {', '.join(faults)}"
@@ -241,7 +241,7 @@ def _exact_readings(
     """`Rig.readings` for several tests, in float64 whatever the session's precision: its steps are microseconds."""
     with jax.enable_x64(True):
         law_64, rig_64 = jax.tree.map(lambda a: a.astype(np.float64) if eqx.is_inexact_array(a) else a, (law, rig))
-        channels = jax.tree.map(jax.numpy.asarray, (time, stroke + rig_64.stroke_offset, velocity, command))
+        channels = jax.tree.map(jax.numpy.asarray, (time, stroke + float(rig_64.stroke_offset), velocity, command))
         readings = jax.vmap(lambda t, x, v, u: rig_64.readings(law_64, t, x, v, command=u))(*channels)
         force, temperature = map(np.asarray, readings)
     require_finite_force(law, force, "over the whole programme")

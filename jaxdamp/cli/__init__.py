@@ -1,5 +1,6 @@
 """The command line: the jobs that need no code, and lists of laws and vehicles."""
 
+import gc
 import signal
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ __all__ = ["app", "main"]
 
 def main() -> None:
     """Run the command line as a program of its own; Ctrl-C is answered from the first import on."""
+    gc.set_threshold(100_000, 20, 100)  # imports and traced programs make millions of objects without cycles
     streams.write_plainly()
     with interrupt.watched(then=signal.SIG_IGN):  # nothing is left to stop while the process ends
         from jaxdamp.cli.application import app

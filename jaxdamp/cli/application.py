@@ -144,7 +144,7 @@ def command(name: str) -> Command:
             early.check(name, given)
             noted = resuming.noted(name, given)
             read = options.values(target, given)
-            console.prepare()
+            console.prepare(quickly=name != "sweep")  # whose lanes run for long
             module, _, function = target.rpartition(".")
             screen = console.Screen()
             arguments = options.build(target, {("screen",): screen, **read})

@@ -1,5 +1,6 @@
 """What the commands share at the terminal: tables, stages with their progress, errors in one sentence."""
 
+import os
 import shutil
 import sys
 import time
@@ -148,18 +149,27 @@ def _escaped(character: str) -> str:
     return character.encode("unicode_escape").decode()
 
 
-def prepare() -> None:
+def prepare(*, quickly: bool) -> None:
     """Double precision, all cores, fast loops, as a command may decide for its own process.
 
     Called from a Python that computes already, it takes devices and loops as they are.
-    """
-    from jaxdamp import configure
 
+    Arguments:
+        quickly: with compiler options that halve the time of compiling, for commands that run a program few times; the
+            loops of single cars are as fast. Options in XLA_FLAGS go before them.
+    """
+    import jax
+
+    from jaxdamp import configure
+    from jaxdamp._forked import started
+
+    if quickly and not started():
+        options = ["--xla_backend_optimization_level=1"]
+        options += ["--xla_cpu_use_fusion_emitters=false"] * (jax.__version_info__ < (0, 11))
+        os.environ["XLA_FLAGS"] = " ".join([*options, os.environ.get("XLA_FLAGS", "")])
     try:
         configure()
     except RuntimeError:
-        import jax
-
         jax.config.update("jax_enable_x64", True)
 
 

@@ -172,8 +172,9 @@ def _rides(screen: Screen, scenario: Scenario, fits: Fitted) -> dict[str, dict[s
     cars = {name: _car(law) for name, law in {TRUE: scenario.law, **{r.name: r.result.law for r in both}}.items()}
     rides = {}
     for title, road in surfaces.items():
-        duration = scenario.duration if title == ISO else min(scenario.duration, EVENT)
-        rides[title] = driven(screen, cars, road, {"duration": duration}, f"Quarter car on {title}")
+        whole = driven(screen, cars, road, {"duration": scenario.duration}, f"Quarter car on {title}")
+        end = scenario.duration if title == ISO else min(scenario.duration, EVENT)  # one program for both lengths
+        rides[title] = {name: response.between(0.0, end) for name, response in whole.items()}
         show_ride(screen, rides[title])
     return rides
 

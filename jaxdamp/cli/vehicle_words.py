@@ -128,8 +128,8 @@ def with_law(vehicle: AbstractVehicle, law: AbstractDamper) -> AbstractVehicle:
 def write_laws(folder: Path, vehicle: AbstractVehicle) -> None:
     """The dampers of a vehicle as JSON: law.json if all are alike, otherwise a file named after each path."""
     laws = {path: get(vehicle, path) for path in matching(damper_paths(vehicle), "*damper")}
-    first = next(iter(laws.values()), None)
-    if first is not None and all(bool(eqx.tree_equal(first, law)) for law in laws.values()):
+    first, *others = laws.values() or [None]
+    if first is not None and all(bool(eqx.tree_equal(first, law)) for law in others):
         laws = {"law": first}
     for path, law in laws.items():
         export.to_json(law, folder / f"{path.replace('.', '_')}.json")

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from jaxdamp._display import rounded
 from jaxdamp._tables import Cell, Column, Shown, Table, with_tied
 from jaxdamp.parameters import Module, free_parameters
@@ -99,4 +101,4 @@ def parameter_table(title: str, estimates: Sequence[Estimate], truth: Module | N
 def _numbers(model: Module) -> dict[str, float]:
     """Every number of a model by name."""
     free = free_parameters(model)
-    return {name: float(value) for name, value in zip(free.names, free.values, strict=True)}
+    return {name: float(value) for name, value in zip(free.names, np.asarray(free.values), strict=True)}

@@ -21,7 +21,7 @@ from jaxdamp.identify.printed_law import PrintedLaw, Record, numbers_on_rig, pla
 from jaxdamp.identify.problem import AbstractResiduals
 from jaxdamp.identify.traces import Batch
 from jaxdamp.parameters import FreeParameters, get, with_values
-from jaxdamp.rig import is_number
+from jaxdamp.rig import LawNumbers, Rig, is_number
 
 
 def _blank(tree: PyTree) -> PyTree:
@@ -87,11 +87,18 @@ def predicted(batch: Batch, model: Model) -> Float[np.ndarray, "runs time"] | No
     """Forces [N] of a model in records; None where XLA computes them."""
     if _refusal([batch], model):
         return None
-    numbers = [numbers_on_rig(_of_row(batch, model, row)) for row in range(len(batch.dt))]
+    numbers = _numbers_of(batch, model)
     law = printed_law(numbers[0], None)
     if law is None:
         return None
     return np.stack([law.forces(own.flat, row) for own, row in zip(numbers, _records(batch), strict=True)])
+
+
+def _numbers_of(batch: Batch, model: Model, rig: Rig | None = None) -> list[LawNumbers]:
+    """The numbers of the law in each record: the same object where no record has values of its own."""
+    if not batch.fixed and not batch.per_record:
+        return [numbers_on_rig(model, rig)] * len(batch.dt)
+    return [numbers_on_rig(_of_row(batch, model, row), rig) for row in range(len(batch.dt))]
 
 
 def _of_row(batch: Batch, model: Model, row: int) -> Model:
@@ -171,10 +178,8 @@ def evaluator(free: FreeParameters, residuals: Sequence[AbstractResiduals]) -> E
     for batch in batches:
         # values that the records state take no free number
         mine = with_values(taken_tree, {path: np.asarray(-1.0) for path in batch.fixed})
-        for row, record in enumerate(_records(batch)):
-            numbers = numbers_on_rig(_of_row(batch, model, row))
-            marked = _of_row(dataclasses.replace(batch, fixed={}), mine, row)
-            taken = numbers_on_rig(marked, _blank(plain_rig()))
+        marked = _numbers_of(dataclasses.replace(batch, fixed={}), mine, _blank(plain_rig()))
+        for record, numbers, taken in zip(_records(batch), _numbers_of(batch, model), marked, strict=True):
             first = first or numbers
             places.append({i for i, array in enumerate(taken.arrays) if np.any(array >= 0)})
             rows.append((offset, record, numbers.flat, taken.flat.astype(np.int64)))

@@ -88,7 +88,7 @@ def _of_sum(law: Sum, weak: Sequence[str], fastest: float, path: str) -> Iterato
             yield Simpler(less, f"without {_in_words(term)}", len(inside), len(inside) / _size(term))
         for part in simpler_laws(term, inside, fastest, place):
             instead = part.law.terms if isinstance(part.law, Sum) else (part.law,)
-            if any(np.any(p.value) for p in parameters(part.law)):
+            if any(np.asarray(p.value).any() for p in parameters(part.law)):
                 yield part._replace(law=Sum((*before, *instead, *after)))
 
 
@@ -206,7 +206,7 @@ def without_zero_terms(law: AbstractDamper) -> AbstractDamper:
     """
     if not isinstance(law, Sum):
         return law
-    terms = [term for term in law.terms if any(np.any(p.value) for p in parameters(term))]
+    terms = [term for term in law.terms if any(np.asarray(p.value).any() for p in parameters(term))]
     return terms[0] if len(terms) == 1 else Sum(tuple(terms)) if terms else law
 
 

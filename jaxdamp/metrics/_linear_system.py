@@ -64,7 +64,7 @@ def respond_exactly(system: StateSpace, signal: Signal, dt: ScalarLike, start: S
 
         matrix = jnp.asarray(expm(growth * float(known) + shift), signal.dtype)
     output = jnp.asarray(system.output_vector, signal.dtype)
-    rest = jnp.zeros(n, signal.dtype) if start is None else jnp.full(n, start, signal.dtype)
+    rest = np.zeros(n, signal.dtype) if start is None else jnp.full(n, start, signal.dtype)
     return _run(matrix, output, jnp.asarray(system.feed_through, signal.dtype), signal, rest)
 
 

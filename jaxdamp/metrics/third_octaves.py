@@ -7,7 +7,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from jaxdamp import _checks
 from jaxdamp._limits import root
-from jaxdamp.metrics.weighted import weighting_factor
+from jaxdamp.metrics.weighted import check_weighting, weighting_factor
 
 
 _NUMBERS = np.arange(-3, 20)  # of the bands from 0.5 to 80 Hz
@@ -51,13 +51,18 @@ def third_octave_rms(
     known = _checks.concrete(lines)
     if known is not None and not (known[1:] > known[:-1]).all():
         _checks.refuse("frequency", "increase", f"{known[0]:g} to {known[-1]:g} Hz in another order")
-    gain = jnp.ones_like(lines) if weighting is None else weighting_factor(lines, weighting)
-    return jnp.asarray(10.0 ** (_NUMBERS / 10.0), lines.dtype), _in_bands(lines, gain**2 * levels)
+    if weighting is not None:
+        check_weighting(weighting)
+    return jnp.asarray(10.0 ** (_NUMBERS / 10.0), lines.dtype), _in_bands(lines, levels, weighting)
 
 
-@jax.jit
-def _in_bands(frequency: Float[Array, " lines"], density: Float[Array, " lines"]) -> Float[Array, " bands"]:
+@jax.jit(static_argnames="weighting")
+def _in_bands(
+    frequency: Float[Array, " lines"], density: Float[Array, " lines"], weighting: str | None
+) -> Float[Array, " bands"]:
     """The root of the integral between the ends of the bands."""
+    if weighting is not None:
+        density = weighting_factor(frequency, weighting) ** 2 * density
     ends = jnp.asarray(10.0 ** ((np.append(_NUMBERS, 20) - 0.5) / 10.0), frequency.dtype)
     cells = 0.5 * (density[1:] + density[:-1]) * jnp.diff(frequency)
     below = jnp.interp(ends, frequency, jnp.concatenate([jnp.zeros(1, cells.dtype), jnp.cumsum(cells)]))

@@ -9,7 +9,7 @@ from jaxdamp import metrics
 from jaxdamp._tables import typeset_unit
 from jaxdamp._types import Axes
 from jaxdamp.plots import _rides, _sheet, _style
-from jaxdamp.plots.frequency import third_octaves, whole_spectrum
+from jaxdamp.plots.frequency import third_octaves, welch, whole_spectrum
 from jaxdamp.plots.rides import default_channels
 from jaxdamp.roads import WhiteRoad
 from jaxdamp.simulation import Response
@@ -69,11 +69,14 @@ def _gains(shown: _rides.Rides, number: int, channels: Sequence[str]) -> dict[st
 
 def _driven(response: Response, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The gain from the height under the first axle, the mean of both sides, to a channel, where the road has power."""
+    from scipy.signal import csd
+
     axles = np.array(response.vehicle.frame().axles)
     rate, dt = np.asarray(response.road_rate)[:, axles == 0].mean(axis=1), _step(response)
     size = min(round(_SEGMENT / dt), len(values))
-    excited = np.asarray(metrics.power_spectral_density(rate, dt, size)[1])
-    frequency, gain = (np.asarray(a) for a in metrics.transmissibility(rate, values, dt, size))
+    frequency, excited = welch(rate, dt, size)
+    gain = np.full(excited.size, np.nan, complex)  # where the road has no power
+    np.divide(csd(rate, values, 1.0 / dt, nperseg=size)[1], excited, out=gain, where=excited > 0.0)
     known = (frequency > 0.8 * LOWEST) & (frequency < 1.2 * HIGHEST)
     known[known] = excited[known] > _EXCITED * excited[known].max()
     frequency = frequency[known]

@@ -139,8 +139,22 @@ def third_octaves(
     _style.plain_log_axis(axes.xaxis)
 
 
+def welch(
+    values: np.ndarray, dt: float, size: int | None = None, *, window: str = "hann"
+) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies and densities of a record, as `metrics.power_spectral_density`, which is compiled for each length.
+
+    Arguments:
+        values: the record.
+        dt: its interval [s].
+        size: samples of a segment; the whole record if left out.
+        window: of SciPy.
+    """
+    from scipy import signal
+
+    return signal.welch(values, 1.0 / dt, window, size or len(values))
+
+
 def whole_spectrum(values: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
     """The density of a whole record as one segment."""
-    found = metrics.power_spectral_density(values, dt, len(values), window="rectangular")
-    frequency, density = (np.asarray(a) for a in found)
-    return frequency, density
+    return welch(values, dt, window="boxcar")

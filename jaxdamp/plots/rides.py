@@ -10,7 +10,7 @@ from jaxdamp._tables import typeset_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Figure
 from jaxdamp.plots import _style, fitted_range
-from jaxdamp.plots.frequency import third_octaves, whole_spectrum
+from jaxdamp.plots.frequency import third_octaves, welch, whole_spectrum
 from jaxdamp.rig import quasi_static
 from jaxdamp.simulation import Response
 from jaxdamp.vehicles import ChannelKind, Layout
@@ -78,11 +78,12 @@ def ride(
         for axes, channel in zip(rows, channels, strict=True):
             axes.plot(time[seen], _factor(first, channel) * np.asarray(all_channels[channel])[seen], **style)
         values = np.asarray(all_channels[channels[0]])
-        label = f"{_style.in_words(name) + ': ' if name else ''}RMS {_style.short(float(metrics.rms(values)))} {unit}"
+        label = f"{_style.in_words(name) + ': ' if name else ''}RMS {_style.short(np.sqrt(np.mean(values**2)))} {unit}"
         frequency, density = _spectrum(values, time, frequencies)
         if weighting is not None:
             dt = float(time[1] - time[0])
-            weighted = metrics.weighted_rms(values, dt, weighting, method="step", remove_mean=False)
+            felt_rms = metrics.Metric(channels[0], "rms", weighting)
+            weighted = response.metrics([felt_rms])[felt_rms.name]
             label += f", weighted by {weighting} {_style.short(float(weighted))} {unit}"
             felt.append(("_", style, whole_spectrum(values, dt)))
         handles += spectrum.loglog(frequency, density, label=label, **style)
@@ -146,7 +147,7 @@ def _spectrum(
     """Welch's estimate with segments longer than a period of the lowest frequency, where the run is."""
     dt = float(time[-1] - time[0]) / (len(time) - 1)
     size = min(max(len(values) // 8, round(1.2 / (band[0] * dt))), len(values))
-    frequency, density = (np.asarray(a) for a in metrics.power_spectral_density(values, dt, size))
+    frequency, density = welch(values, dt, size)
     inside = (frequency > 0) & (frequency >= band[0]) & (frequency <= band[1])
     return frequency[inside], density[inside]
 
@@ -205,9 +206,9 @@ def damper_use(responses: Response | Mapping[str, Response], *, damper: str | No
         gaps += [f"{name or 'law'}: {curve.note}"] if curve.note else []
         force_held = np.asarray(curve.force)
         handles += fitted_range.curve(trace, law, held, force_held, label=_style.in_words(name) or "law", **style)
-        shares = metrics.velocity_histogram(velocity, edges), metrics.dissipation_histogram(force, velocity, edges)
-        for axes, share in zip((time_share, energy_share), shares, strict=True):
-            axes.step(middles, 100.0 * np.asarray(share), where="mid", **style)
+        for axes, weight in ((time_share, np.ones_like(velocity)), (energy_share, force * velocity)):
+            share = np.histogram(velocity, edges, weights=weight)[0] / np.sum(weight)
+            axes.step(middles, 100.0 * share, where="mid", **style)
     reached = np.linspace(-reach, reach, _SHADE_POINTS)
     shaded = [fitted_range.shade(axes, laws.values(), reached) for axes in (trace, time_share, energy_share)]
     handles += shaded[0]

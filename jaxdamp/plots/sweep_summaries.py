@@ -1,18 +1,23 @@
 """What was kept of a sweep: histograms, means and ranges, a Pareto set."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._tables import typeset_unit
 from jaxdamp._types import Axes, Figure
 from jaxdamp.plots import _style
-from jaxdamp.sweeps import SweepSummary
+
+
+if TYPE_CHECKING:
+    from jaxdamp.sweeps import SweepSummary
 
 
 _COLUMNS = 3  # of panels
 
 
-def sweep_summary(result: SweepSummary) -> Figure:
+def sweep_summary(result: "SweepSummary") -> Figure:
     """A histogram of each result that has one, with its mean and standard deviation; else its mean and range.
 
     The Pareto set is drawn over its first two results. Points outside the bins are counted in the title.
@@ -20,6 +25,8 @@ def sweep_summary(result: SweepSummary) -> Figure:
     Arguments:
         result: of `jaxdamp.sweep(..., summary=...)`.
     """
+    from jaxdamp.sweeps import SweepSummary  # with xarray and pandas, which other pictures do without
+
     remedy = "The call is `sweep_summary(found)` with the result of `jaxdamp.sweep(..., summary=sweeps.Summary())`."
     _checks.instance("result", result, SweepSummary, "be the summary of a sweep", remedy)
     names = [str(name) for name in result.statistics.data_vars]
@@ -42,7 +49,7 @@ def sweep_summary(result: SweepSummary) -> Figure:
     return figure
 
 
-def _spread(axes: Axes, result: SweepSummary, name: str) -> None:
+def _spread(axes: Axes, result: "SweepSummary", name: str) -> None:
     """A histogram with mean and standard deviation, or these alone between the ends."""
     _, mean, deviation, low, high = result.statistics[name].values.tolist()
     title = _style.metric_words(name)

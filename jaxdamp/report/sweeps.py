@@ -11,7 +11,6 @@ from jaxdamp._types import DataArray, Dataset
 from jaxdamp._words import path_words
 from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.page import Report
-from jaxdamp.sweeps import without_effect
 from jaxdamp.tune import limit_spans
 
 
@@ -85,6 +84,8 @@ def best_points(
         allowed = allowed & (data[name] >= lower) & (data[name] <= upper)
     count, total = int(allowed.sum()), int(allowed.size)
     sentences = [f"{count} of {total} points are within all limits."] if limits else []
+    from jaxdamp.sweeps import without_effect  # with xarray and pandas, which other pages do without
+
     idle = without_effect(data)
     sentences += [
         f"{path_words(over)} has no effect on {path_words(name)}: no value of it is better than another."

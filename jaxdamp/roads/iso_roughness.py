@@ -183,13 +183,19 @@ class Iso8608(AbstractRoad):
 
         Equal tracks stay equal, independent ones independent.
         """
-        turn, shift = uniform(seed, (2, self.phase.size))
-        phase = (self.phase + 2.0 * math.pi * turn) % (2.0 * math.pi)
+        phase, size = _shifted(self.phase, self.relative_amplitude, uniform(seed, (2, self.phase.size)))
         if self.amplitudes == "fixed":
             return eqx.tree_at(lambda road: road.phase, self, phase)
-        above = jnp.exp(-(self.relative_amplitude**2))
-        drawn = (phase, rayleigh((above + shift) % 1.0))
-        return eqx.tree_at(lambda road: (road.phase, road.relative_amplitude), self, drawn)
+        return eqx.tree_at(lambda road: (road.phase, road.relative_amplitude), self, (phase, size))
+
+
+@jax.jit
+def _shifted(
+    phase: Float[Array, " waves"], size: Float[Array, " waves"], drawn: Float[Array, "2 waves"]
+) -> tuple[Float[Array, " waves"], Float[Array, " waves"]]:
+    """Phases [rad] and relative amplitudes whose probabilities are shifted by numbers between 0 and 1."""
+    turn, shift = drawn
+    return (phase + 2.0 * math.pi * turn) % (2.0 * math.pi), rayleigh((jnp.exp(-(size**2)) + shift) % 1.0)
 
 
 def iso8608(

@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PyTree
 
@@ -70,9 +69,10 @@ def range_uses(
     tree: PyTree = (vehicle, motion)
     if not has_fitted_range(vehicle) or any(_checks.concrete(leaf) is None for leaf in jax.tree.leaves(tree)):
         return {}
-    position, rate = jnp.split(motion, 2, axis=1)
-    strokes, velocities = (np.asarray(form.at_ports(*at), dtype=float) for at in ((position, road), (rate, road_rate)))
-    forces = np.asarray(port_force, dtype=float)
+    form, motion, road, road_rate, forces = jax.tree.map(np.asarray, (form, motion, road, road_rate, port_force))
+    count = motion.shape[1] // 2
+    pairs = (motion[:, :count], road), (motion[:, count:], road_rate)
+    strokes, velocities = (np.asarray(form.at_ports(*pair)) for pair in pairs)
     uses_of = {}
     for i, (name, law) in enumerate(named_laws(vehicle).items()):
         uses = range_use(law, Motion(strokes[:, i], velocities[:, i], forces[:, i]))

@@ -2,20 +2,21 @@
 
 import dataclasses
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Sequence
 from pathlib import Path
-from typing import Any, final
+from typing import Any, TypeVar, final
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float, Int, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._guesses import Elsewhere
 from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._tables import Contents, Table, with_unit
+from jaxdamp._traced import is_traced
 from jaxdamp._types import Dataset, Figure, Scalar, Signal
 from jaxdamp.dampers import RangeUse
 from jaxdamp.metrics import Metric
@@ -33,15 +34,18 @@ from jaxdamp.simulation.wheels import AxleTiming
 from jaxdamp.vehicles import AbstractVehicle, LinearMap, System
 
 
+T = TypeVar("T")
+
+
 @jax.tree_util.register_pytree_node_class
-class _Channels(dict[str, Signal]):
-    """The channels of one response that were asked for. It holds no leaf: another response begins without any."""
+class _Remembered(dict[Hashable, PyTree]):
+    """What was computed of one response. It holds no leaf: another response begins without any."""
 
     def tree_flatten(self) -> tuple[tuple[()], None]:
         return (), None
 
     @classmethod
-    def tree_unflatten(cls, aux: None, leaves: Sequence[object]) -> "_Channels":
+    def tree_unflatten(cls, aux: None, leaves: Sequence[object]) -> "_Remembered":
         return cls()
 
 
@@ -57,6 +61,12 @@ def _channel(
     """One channel over time."""
     row = jax.tree.map(lambda matrix: matrix[number][None], outputs)
     return jax.vmap(row)(motion, port_force, road, road_rate)[:, 0]
+
+
+@jax.jit(static_argnames="part")
+def _rows(arrays: dict[str, Array], part: tuple[int, int]) -> dict[str, Array]:
+    """The rows from one to another of each array."""
+    return {name: array[slice(*part)] for name, array in arrays.items()}
 
 
 @final
@@ -96,7 +106,7 @@ class Response(eqx.Module, AbstractResult):
     begin: Int[Array, ""] | None = None
     commands: Float[Array, "time commands"] | None = None
     histogram = Elsewhere("`jaxdamp.metrics.velocity_histogram(response['damper_velocity'], edges)`")
-    _computed: _Channels = eqx.field(init=False, repr=False, default_factory=_Channels)
+    _computed: _Remembered = eqx.field(init=False, repr=False, default_factory=_Remembered)
 
     @property
     def run(self) -> "Response":
@@ -156,16 +166,22 @@ class Response(eqx.Module, AbstractResult):
     def __getitem__(self, channel: str) -> Signal:
         numbers = self.system.layout.numbers
         _checks.one_of("channel", channel, numbers)
-        if channel in self._computed:
-            return self._computed[channel]
-        number = jnp.asarray(numbers[channel])
-        force = self.port_force
-        if self.commands is not None:
-            force = jnp.concatenate([force, self.commands], axis=-1)
-        values = _channel(self.system.outputs, number, self.motion, force, self.road, self.road_rate)
-        if _checks.concrete(values) is None:  # traced: it belongs to one program
-            return values
-        return self._computed.setdefault(channel, values)
+
+        def made() -> Signal:
+            force = self.port_force
+            if self.commands is not None:
+                force = jnp.concatenate([force, self.commands], axis=-1)
+            number = np.asarray(numbers[channel])
+            return _channel(self.system.outputs, number, self.motion, force, self.road, self.road_rate)
+
+        return self.remembered(channel, made)
+
+    def remembered(self, key: Hashable, make: Callable[[], T]) -> T:
+        """What `make` computes of this response, once for each key; not kept while JAX traces: it is of one program."""
+        if key in self._computed:
+            return self._computed[key]
+        made = make()
+        return made if is_traced(made) else self._computed.setdefault(key, made)
 
     def metrics(self, names: Sequence[str | Metric] | None = None) -> dict[str, Scalar]:
         """The vehicle's ride metrics by name, or those wanted, over the run or the part of it that this is.
@@ -203,10 +219,12 @@ class Response(eqx.Module, AbstractResult):
         if start < time[0] - slack or stop > time[-1] + slack or inside.size < 2:
             must = f"be two instants or more of the run, {time[0]:g} to {time[-1]:g} s"
             _checks.refuse("start, stop", must, f"{start:g} and {stop:g}")
-        part, last = slice(inside[0], inside[-1] + 1), inside[-1] + 1 == time.size
+        part, last = (int(inside[0]), int(inside[-1]) + 1), inside[-1] + 1 == time.size
+        if part == (0, time.size):
+            return self
         states = [state if last else jnp.full_like(state, jnp.nan) for state in self.final_state]
         names = ("time", "motion", "port_force", "road", "road_rate", "commands")
-        arrays = {name: values[part] for name in names if (values := getattr(self, name)) is not None}
+        arrays = _rows({name: values for name in names if (values := getattr(self, name)) is not None}, part)
         begin = jnp.asarray(inside[0] + (0 if self.begin is None else self.begin))
         return dataclasses.replace(self, **arrays, final_state=states, whole=self.run, begin=begin)
 

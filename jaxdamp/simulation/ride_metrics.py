@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks, metrics
 from jaxdamp._tables import Compared, Table, comparison_table, percent_change
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Scalar, ScalarLike, Signal
-from jaxdamp.metrics import Metric, MetricValues
+from jaxdamp.metrics import Metric, MetricValues, Statistic
 from jaxdamp.simulation.equations import settled
+from jaxdamp.vehicles import System
 
 
 if TYPE_CHECKING:
@@ -43,7 +44,13 @@ def ride_metrics(response: "Response", names: Sequence[str | Metric] | None = No
         ValueError: a name that is no ride metric, or a window in a run whose times JAX traces.
     """
     chosen, dt = response.vehicle.chosen_metrics(names, "names"), _step(response)
-    values = _computed(response, [(metric, _samples(response, metric, dt)) for metric in chosen], dt)
+
+    def made() -> dict[str, Scalar]:
+        signals = {metric.name: _signals(response, metric, dt) for metric in chosen}
+        samples = {metric.name: (metric.statistic, _samples(response, metric, dt)) for metric in chosen}
+        return _computed(signals, samples, dt)
+
+    values = response.remembered(tuple(chosen), made)
     return MetricValues.with_units(values, {metric.name: metric.unit(response.units) for metric in chosen})
 
 
@@ -55,7 +62,14 @@ def comfort(response: "Response") -> dict[str, Comfort]:
     Arguments:
         response: the run, or a part of it.
     """
-    return _comfort(response, _step(response))
+    layout, dt = response.system.layout, _step(response)
+    names = dict.fromkeys(m.channel for m in layout.metrics if layout.by_name[m.channel].kind.weighting)
+
+    def of(name: str) -> Comfort:
+        signal = _weighted(response, name, layout.weighting(name), dt)
+        return response.remembered((name, Comfort), lambda: _comfort(signal, dt))
+
+    return {name: of(name) for name in names}
 
 
 def _step(response: "Response") -> ScalarLike:
@@ -76,48 +90,67 @@ def _samples(response: "Response", metric: Metric, dt: ScalarLike) -> tuple[int,
     return metric.samples(time.size, float(dt), float(time[0]))
 
 
+class _Signals(NamedTuple):
+    """What a metric is of: the record, where it is at rest, and what it is multiplied by."""
+
+    signal: Signal
+    rest: Scalar | None
+    by: Signal | None
+
+
+def _signals(response: "Response", metric: Metric, dt: ScalarLike) -> _Signals:
+    channel, weighting = metric.channel, metric.weighting
+    signal = response[channel] if weighting is None else _weighted(response, channel, weighting, dt)
+    rest = _at_rest(response.run)[response.system.layout.numbers[channel]] if metric.from_rest else None
+    return _Signals(signal, rest, response[metric.by] if metric.by else None)
+
+
 @eqx.filter_jit
 def _computed(
-    response: "Response", chosen: Sequence[tuple[Metric, tuple[int, int]]], dt: ScalarLike
+    signals: dict[str, _Signals], chosen: dict[str, tuple[Statistic, tuple[int, int]]], dt: ScalarLike
 ) -> dict[str, Scalar]:
-    """The values of metrics, each over its samples."""
+    """The values of statistics, each over its samples; one program for all vehicles and laws."""
     values = {}
-    pairs = {(metric.channel, metric.weighting) for metric, _ in chosen if metric.weighting is not None}
-    weighted = {pair: _weighted(response, *pair, dt) for pair in sorted(pairs)}
-    at_rest = _at_rest(response) if any(metric.from_rest for metric, _ in chosen) else jnp.zeros(0)
-    for metric, (first, last) in chosen:
-        weighting = metric.weighting
-        signal = response[metric.channel] if weighting is None else weighted[metric.channel, weighting]
-        if metric.from_rest:
-            signal = signal - at_rest[response.system.layout.numbers[metric.channel]]
-        signal = signal * response[metric.by] if metric.by else signal
-        values[metric.name] = metric.statistic.of(signal[first : last + 1], dt)
+    for name, (statistic, (first, last)) in chosen.items():
+        signal, rest, by = signals[name]
+        signal = signal if rest is None else signal - rest
+        signal = signal if by is None else signal * by
+        values[name] = statistic.of(signal[first : last + 1], dt)
     return values
 
 
 @eqx.filter_jit
-def _comfort(response: "Response", dt: ScalarLike) -> dict[str, Comfort]:
-    numbers, layout = {}, response.system.layout
-    for name in dict.fromkeys(m.channel for m in layout.metrics if layout.by_name[m.channel].kind.weighting):
-        weighted = _weighted(response, name, layout.weighting(name), dt)
-        transient = metrics.max_transient_value(weighted, dt, None)
-        dose = metrics.vibration_dose_value(weighted, dt, None)
-        numbers[name] = Comfort(metrics.rms(weighted), transient, dose)
-    return numbers
+def _comfort(weighted: Signal, dt: ScalarLike) -> Comfort:
+    transient = metrics.max_transient_value(weighted, dt, None)
+    return Comfort(metrics.rms(weighted), transient, metrics.vibration_dose_value(weighted, dt, None))
 
 
 def _weighted(response: "Response", channel: str, weighting: str, dt: ScalarLike) -> Signal:
     """An acceleration weighted by ISO 2631-1 from the start of the run."""
-    weighted = metrics.weighted_signal(response.run[channel], dt, weighting, method="step", remove_mean=False)
-    if response.begin is None:
-        return weighted
-    return jax.lax.dynamic_slice_in_dim(weighted, response.begin, response.time.size)
+
+    def made() -> Signal:
+        if response.begin is None:
+            return metrics.weighted_signal(response[channel], dt, weighting, method="step", remove_mean=False)
+        whole = _weighted(response.run, channel, weighting, dt)
+        return _cut(whole, response.begin, response.time.size)
+
+    return response.remembered((channel, weighting), made)
 
 
-def _at_rest(response: "Response") -> Float[Array, " channels"]:
-    """The channels in the static equilibrium on the first heights of the run, forces left out."""
-    road, system = response.run.road[0], response.system
-    return system.outputs(settled(system, road), jnp.zeros(system.outputs.force.shape[1]), road, None)
+_cut = jax.jit(jax.lax.dynamic_slice_in_dim, static_argnums=2)  # in one program
+
+
+def _at_rest(run: "Response") -> tuple[Scalar, ...]:
+    """The channels in the static equilibrium on the first heights of a run, forces left out."""
+    known = _checks.concrete(run.road)
+    first = run.road[0] if known is None else known[0]
+    return run.remembered("at rest", lambda: _channels_at_rest(run.system, first))
+
+
+@eqx.filter_jit
+def _channels_at_rest(system: System, road: Float[ArrayLike, " wheels"]) -> tuple[Scalar, ...]:
+    height = jnp.asarray(road)
+    return tuple(system.outputs(settled(system, height), jnp.zeros(system.outputs.force.shape[1]), height, None))
 
 
 if TYPE_CHECKING:

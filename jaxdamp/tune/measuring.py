@@ -171,12 +171,14 @@ class BatchProgram:
         parts = [np.asarray(_values(measured, self.free, part), np.float64) for part in self._in_lanes(designs)]
         return np.concatenate([np.atleast_2d(part) for part in parts])[: len(designs)]
 
-    def at(self, designs: Float[np.ndarray, "points free"]) -> Computed:
-        """All numbers of designs, and derivatives by the physical values."""
+    def at(self, designs: Float[np.ndarray, "points free"], ride: Ride | ScenarioRide | None = None) -> Computed:
+        """All numbers of designs, and derivatives by the physical values; by another ride if one is given."""
         self.points += len(designs)
-        values, slopes = [], []
+        measured, values, slopes = self.measured, [], []
+        if ride is not None:
+            measured = measured.by(ride if self.lanes == 1 else ride.side_by_side())
         for part in self._in_lanes(designs):
-            numbers, derivatives = _values_and_slopes(self.measured, self.free, part, self.differentiated, self._mode)
+            numbers, derivatives = _values_and_slopes(measured, self.free, part, self.differentiated, self._mode)
             values.append(np.atleast_2d(np.asarray(numbers, np.float64)))
             slopes.append(np.asarray(derivatives, np.float64).reshape(-1, *derivatives.shape[-2:]))
         return Computed(np.concatenate(values)[: len(designs)], np.concatenate(slopes)[: len(designs)])

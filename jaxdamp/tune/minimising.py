@@ -17,9 +17,10 @@ from jaxdamp.tune.combinations import Combinations, beside_next
 from jaxdamp.tune.combining import Driven, every_combination, rank
 from jaxdamp.tune.descending import Descent, Ended, missed, reached
 from jaxdamp.tune.limits import Limit, LimitEnd, limit_ends
+from jaxdamp.tune.measuring import ride_on
 from jaxdamp.tune.objective import Function, check_objective
 from jaxdamp.tune.ranges import start_points
-from jaxdamp.tune.rescoring import on_fresh_roads
+from jaxdamp.tune.rescoring import Rescore, driver, on_fresh_roads
 from jaxdamp.tune.result import Attempt, Drive, ScenarioValues, TuneResult, V
 from jaxdamp.tune.scenario_ride import ScenarioRide, exact
 from jaxdamp.tune.scenarios import Road, Scenarios
@@ -39,6 +40,7 @@ from jaxdamp.tune.verdict import (
     without_effect,
     workshop_notes,
 )
+from jaxdamp.vehicles import AbstractVehicle
 
 
 OUTWARDS = 1e-3  # of what the search reached, by which a relaxed limit is beyond it
@@ -123,7 +125,7 @@ def minimise(
         several = descent.search(starts, evaluations, limits)
         ended = _best(descent, several, limits)
         attempts = _attempts(task, starts, several, limits) if len(several) > 1 else ()
-        result = _result(task, evaluations[0], ended, attempts, (limits, limits), max_steps, fresh_roads)
+        result = _result(evaluator, evaluations[0], ended, attempts, (limits, limits), max_steps, fresh_roads)
         tighter = limits
         for again in range(1, TIGHTENED + 1):
             excess = {} if result.violated else lost_limits(result)
@@ -132,19 +134,25 @@ def minimise(
             tighter = [limit.tightened(excess.get(limit.of, 0.0)) for limit in tighter]
             again_from = descent.search([ended.values / task.space.unit], [ended.evaluation], tighter)
             ended = _best(descent, again_from, tighter)
-            result = _result(task, evaluations[0], ended, attempts, (limits, tighter), max_steps, fresh_roads, again)
-    return result if combining is None else _beside_others(result, task, combining.combinations(tighter), fresh_roads)
+            result = _result(
+                evaluator, evaluations[0], ended, attempts, (limits, tighter), max_steps, fresh_roads, again
+            )
+    return (
+        result if combining is None else _beside_others(result, evaluator, combining.combinations(tighter), fresh_roads)
+    )
 
 
 def _beside_others(
-    result: TuneResult[V], task: DesignTask[V], combinations: Combinations, fresh_roads: int
+    result: TuneResult[V], evaluator: Evaluator, combinations: Combinations, fresh_roads: int
 ) -> TuneResult[V]:
     """The result with all combinations that were driven, the best one beside the next."""
+    task = evaluator.task
     if np.count_nonzero(combinations.met) > 1:
         values = np.array([column[1] for column in combinations.choices.values()])
         cars = task.space.free.build(jnp.asarray(values, task.space.free.values.dtype)), result.vehicle
-        fresh = on_fresh_roads(cars, task.road, range(fresh_roads), {}, task.objective, task.units, task.run)
-        text = beside_next(combinations, task.objective.name, fresh)
+        name, drive = task.objective.name, driver(cars, task.objective.metrics, task.objective, task.run)
+        fresh = on_fresh_roads(drive, (cars, task.run), task.road, range(fresh_roads), {}, task.units, name)
+        text = beside_next(combinations, name, fresh)
         combinations = dataclasses.replace(combinations, beside_next=text)
     return dataclasses.replace(result, combinations=combinations)
 
@@ -187,7 +195,7 @@ def _status(task: DesignTask[Any], ended: Ended, short: Sequence[Limit]) -> Stat
 
 
 def _result(
-    task: DesignTask[V],
+    evaluator: Evaluator,
     start: Evaluation,
     ended: Ended,
     attempts: tuple[Attempt, ...],
@@ -195,11 +203,12 @@ def _result(
     max_steps: int,
     fresh_roads: int,
     again: int = 0,
-) -> TuneResult[V]:
+) -> TuneResult[Any]:
     """The result of a tuning, judged: what holds it, what it misses, and what it is worth on fresh roads.
 
     Limits are those of the task and those of the search, which are tighter after it was repeated so many times.
     """
+    task = evaluator.task
     vehicle, space, objective, units = task.vehicle, task.space, task.objective, task.units
     before, after = task.numbers(start.values), task.numbers(ended.evaluation.values)
     idle = without_effect(space, (start, ended.evaluation), ended.values)
@@ -213,8 +222,7 @@ def _result(
         notes.append(early_end(ended, max_steps))
     tuned = space.free.build(jnp.asarray(ended.values, space.free.values.dtype))
     runs, extrapolated = task.notes_on_runs(tuned)
-    realisations = range(again * fresh_roads, (again + 1) * fresh_roads)
-    fresh = on_fresh_roads((vehicle, tuned), task.road, realisations, task.allowed, objective, units, task.run)
+    fresh = _on_fresh_roads(evaluator, tuned, ended.values, range(again * fresh_roads, (again + 1) * fresh_roads))
     each, reported = _in_scenarios(task, tuned, before, after)
     road = task.road.scenarios[0].road if isinstance(task.road, Scenarios) else task.road
     return TuneResult(
@@ -243,6 +251,23 @@ def _result(
         elsewhere=_where(task, fresh_roads),
         relaxation=_relaxation(task, ended, limits),
     )
+
+
+def _on_fresh_roads(
+    evaluator: Evaluator, tuned: AbstractVehicle, values: np.ndarray, numbers: Sequence[int]
+) -> Rescore | None:
+    """The vehicle before and after on other realisations of its road, by the program of the search."""
+    task, cars = evaluator.task, (evaluator.task.vehicle, tuned)
+    designs = np.stack([task.space.start, values])
+
+    def by_search(road: Road | Scenarios) -> list[dict[str, float]]:
+        ride = ride_on(task.vehicle, road, task.objective, task.run)
+        return [task.numbers(row) for row in evaluator.program.at(designs, ride).values]
+
+    of_scenarios = isinstance(task.road, Scenarios)  # whose true risk counts, not a smooth one
+    drive = driver(cars, task.objective.metrics, task.objective, task.run) if of_scenarios else by_search
+    name = task.objective.name
+    return on_fresh_roads(drive, (cars, task.run), task.road, numbers, task.allowed, task.units, name)
 
 
 def _in_scenarios(

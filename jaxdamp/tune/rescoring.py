@@ -3,8 +3,8 @@
 import dataclasses
 import itertools
 import warnings
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, Unpack, final
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, Unpack, final
 
 import numpy as np
 from jaxtyping import Float
@@ -15,13 +15,13 @@ from jaxdamp._pieces import piece
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Compared, Table, comparison_table, plain
 from jaxdamp._types import Scalar
-from jaxdamp.metrics import Metric, power_spectral_density
+from jaxdamp.metrics import Metric
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride, simulate
 from jaxdamp.tune.limits import LimitRange
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.scenario_ride import exact
-from jaxdamp.tune.scenarios import Scenarios
+from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import RUN, Run, completed
 from jaxdamp.tune.verdict import decided, half_interval
 from jaxdamp.vehicles import AbstractVehicle, frequency_response, linearise
@@ -58,15 +58,17 @@ def spectra(
         gains = frequency_response(linear, frequency, speed=road.speed)
         height = 2.0 * float(road.velocity_psd) / (2.0 * np.pi * frequency) ** 2
         return {name: Spectrum(frequency, np.abs(np.asarray(gains[name])) ** 2 * height) for name in channels}
+    from scipy.signal import welch  # `power_spectral_density` is compiled anew for each length
+
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the notes of the tuning say it
         response = simulate(vehicle, road, **run)
-    dt = float(response.time[1] - response.time[0])
+    dt = float(np.diff(np.asarray(response.time))[0])
     by_channel = {}
     for name in channels:
         values = np.asarray(response[name])
         segment = min(round(1.2 / (LOWEST * dt)), len(values))
-        frequency, density = (np.asarray(a) for a in power_spectral_density(values - values.mean(), dt, segment))
+        frequency, density = welch(values, 1.0 / dt, nperseg=segment)
         inside = (frequency >= LOWEST) & (frequency <= HIGHEST)
         by_channel[name] = Spectrum(frequency[inside], density[inside])
     return by_channel
@@ -205,21 +207,24 @@ def rescore(
     metrics += [m for m in (objective.metrics if objective else ()) if m not in metrics]
     units = {m.name: m.unit(result.start.units) for m in metrics} | (objective.units(result.start) if objective else {})
     cars = (result.start, result.vehicle)
-    return rescored(cars, roads, metrics, objective, units, result.metric, completed("rescore", run, RUN))
+    drive = driver(cars, metrics, objective, completed("rescore", run, RUN))
+    return rescored(drive, roads, units, result.metric)
 
 
-def rescored(
+Driver: TypeAlias = Callable[
+    [Road | Scenarios], Sequence[Mapping[str, Scalar | float]]
+]  # on a road, the vehicle before and after
+
+
+def driver(
     cars: tuple[AbstractVehicle, AbstractVehicle],
-    roads: Sequence[Any],
     metrics: Sequence[Metric],
     objective: Objective | None,
-    units: dict[str, str],
-    metric: str,
     run: Mapping[str, Any],
-) -> Rescore:
-    """The metrics of the vehicle before and after on roads or in scenarios."""
+) -> Driver:
+    """The metrics of two vehicles on a road or in scenarios."""
 
-    def drive(car: AbstractVehicle, road: Any) -> Mapping[str, Scalar]:
+    def drive(car: AbstractVehicle, road: Road | Scenarios) -> Mapping[str, Scalar]:
         if isinstance(road, Scenarios):
             ride = road.ride(car, metrics=metrics, **run)
             each = objective.of_each(ride.each()) if objective else ride.each()
@@ -228,23 +233,35 @@ def rescored(
         values = Ride(car, road, metrics=metrics, **run)()
         return objective.of(values) if objective else values
 
-    before, after = ([drive(car, road) for road in roads] for car in cars)
-    before, after = (
-        {name: np.array([float(values[name]) for values in runs]) for name in units} for runs in (before, after)
-    )
+    return lambda road: [drive(car, road) for car in cars]
+
+
+def rescored(drive: Driver, roads: Sequence[Any], units: dict[str, str], metric: str) -> Rescore:
+    """The metrics of the vehicle before and after on roads or in scenarios."""
+    runs = [drive(road) for road in roads]
+    before, after = ({name: np.array([float(pair[side][name]) for pair in runs]) for name in units} for side in (0, 1))
     return Rescore(before, after, units, metric)
 
 
 def on_fresh_roads(
-    cars: tuple[AbstractVehicle, AbstractVehicle],
+    drive: Driver,
+    inputs: tuple[object, ...],
     road: Any,
     numbers: Sequence[int],
     allowed: Mapping[str, LimitRange],
-    objective: Objective,
     units: dict[str, str],
-    run: Mapping[str, Any],
+    metric: str,
 ) -> Rescore | None:
     """The vehicle before and after on other realisations of a road, on so many that gain and limits are decided.
+
+    Arguments:
+        drive: the metrics on a road.
+        inputs: what they depend on beside the road.
+        road: of the tuning.
+        numbers: of the realisations.
+        allowed: the range of each limited metric.
+        units: of the metrics.
+        metric: that was minimised.
 
     Returns:
         None where there is no other realisation.
@@ -254,9 +271,8 @@ def on_fresh_roads(
         part = others[first:last]
         if not part:
             break
-        inputs = ("fresh roads", cars, part, objective.name, units, run)
-        what = (cars, part, objective.metrics, objective, units, objective.name, run)
-        new = piece(inputs, lambda what=what: rescored(*what))
+        what = ("fresh roads", *inputs, part, metric, units)
+        new = piece(what, lambda part=part: rescored(drive, part, units, metric))
         driven = new if driven is None else driven.and_on(new)
         if decided(driven, allowed):
             break

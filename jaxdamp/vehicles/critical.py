@@ -46,7 +46,7 @@ def critical_damping(vehicle: AbstractVehicle) -> dict[str, CriticalDamping]:
     """
     check_module("vehicle", vehicle, (AbstractVehicle,), "critical_damping(vehicle)")
     frame = vehicle.frame()
-    loads, springs = frame.static_wheel_loads(), _springs(frame)
+    loads, springs = vehicle.system().static_loads, _springs(frame)  # which is compiled already
     on_road = [{name for name in wheel.point.terms if name[:2] == "z_"} for wheel in frame.wheels]
     lower = [_lower_end(link, set().union(*on_road)) for link in frame.links]
     pairs = {}
