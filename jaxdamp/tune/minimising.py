@@ -1,7 +1,7 @@
 """`minimise`: tune the free parameters of a vehicle for a ride metric, by exact gradients."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Unpack
 
 import jax.numpy as jnp
@@ -16,7 +16,7 @@ from jaxdamp.solve import Evaluation
 from jaxdamp.tune.combinations import Combinations, beside_next
 from jaxdamp.tune.combining import Driven, every_combination, rank
 from jaxdamp.tune.descending import Descent, Ended, missed, reached
-from jaxdamp.tune.limits import Limit, LimitEnd, limit_ends
+from jaxdamp.tune.limits import Limit, LimitEnd, LimitRange, limit_ends
 from jaxdamp.tune.measuring import ride_on
 from jaxdamp.tune.objective import Function, check_objective
 from jaxdamp.tune.ranges import start_points
@@ -40,7 +40,6 @@ from jaxdamp.tune.verdict import (
     without_effect,
     workshop_notes,
 )
-from jaxdamp.vehicles import AbstractVehicle
 
 
 OUTWARDS = 1e-3  # of what the search reached, by which a relaxed limit is beyond it
@@ -134,27 +133,20 @@ def minimise(
             tighter = [limit.tightened(excess.get(limit.of, 0.0)) for limit in tighter]
             again_from = descent.search([ended.values / task.space.unit], [ended.evaluation], tighter)
             ended = _best(descent, again_from, tighter)
-            result = _result(
-                evaluator, evaluations[0], ended, attempts, (limits, tighter), max_steps, fresh_roads, again
-            )
-    return (
-        result if combining is None else _beside_others(result, evaluator, combining.combinations(tighter), fresh_roads)
-    )
-
-
-def _beside_others(
-    result: TuneResult[V], evaluator: Evaluator, combinations: Combinations, fresh_roads: int
-) -> TuneResult[V]:
-    """The result with all combinations that were driven, the best one beside the next."""
-    task = evaluator.task
-    if np.count_nonzero(combinations.met) > 1:
-        values = np.array([column[1] for column in combinations.choices.values()])
-        cars = task.space.free.build(jnp.asarray(values, task.space.free.values.dtype)), result.vehicle
-        name, drive = task.objective.name, driver(cars, task.objective.metrics, task.objective, task.run)
-        fresh = on_fresh_roads(drive, (cars, task.run), task.road, range(fresh_roads), {}, task.units, name)
-        text = beside_next(combinations, name, fresh)
-        combinations = dataclasses.replace(combinations, beside_next=text)
+            both = limits, tighter
+            result = _result(evaluator, evaluations[0], ended, attempts, both, max_steps, fresh_roads, again)
+    combinations = None if combining is None else _beside_next(evaluator, combining.combinations(tighter), fresh_roads)
     return dataclasses.replace(result, combinations=combinations)
+
+
+def _beside_next(evaluator: Evaluator, combinations: Combinations, fresh_roads: int) -> Combinations:
+    """The combinations, with the best one beside the next where two or more meet the limits."""
+    if np.count_nonzero(combinations.met) < 2:
+        return combinations
+    best, following, *_ = np.transpose([*combinations.choices.values()])
+    fresh = _on_fresh_roads(evaluator, (following, best), range(fresh_roads), {})
+    text = beside_next(combinations, evaluator.task.objective.name, fresh)
+    return dataclasses.replace(combinations, beside_next=text)
 
 
 def _best(descent: Descent | Driven, several: Sequence[Ended], limits: Sequence[Limit]) -> Ended:
@@ -222,7 +214,8 @@ def _result(
         notes.append(early_end(ended, max_steps))
     tuned = space.free.build(jnp.asarray(ended.values, space.free.values.dtype))
     runs, extrapolated = task.notes_on_runs(tuned)
-    fresh = _on_fresh_roads(evaluator, tuned, ended.values, range(again * fresh_roads, (again + 1) * fresh_roads))
+    realisations = range(again * fresh_roads, (again + 1) * fresh_roads)
+    fresh = _on_fresh_roads(evaluator, (space.start, ended.values), realisations, task.allowed)
     each, reported = _in_scenarios(task, tuned, before, after)
     road = task.road.scenarios[0].road if isinstance(task.road, Scenarios) else task.road
     return TuneResult(
@@ -254,11 +247,15 @@ def _result(
 
 
 def _on_fresh_roads(
-    evaluator: Evaluator, tuned: AbstractVehicle, values: np.ndarray, numbers: Sequence[int]
+    evaluator: Evaluator,
+    sides: tuple[np.ndarray, np.ndarray],
+    numbers: Sequence[int],
+    allowed: Mapping[str, LimitRange],
 ) -> Rescore | None:
-    """The vehicle before and after on other realisations of its road, by the program of the search."""
-    task, cars = evaluator.task, (evaluator.task.vehicle, tuned)
-    designs = np.stack([task.space.start, values])
+    """Two designs, by their numbers, on other realisations of the road of a search, by its program."""
+    task, designs = evaluator.task, np.stack(sides)
+    one, other = (task.space.free.build(jnp.asarray(side, task.space.free.values.dtype)) for side in sides)
+    cars = one, other
 
     def by_search(road: Road | Scenarios) -> list[dict[str, float]]:
         ride = ride_on(task.vehicle, road, task.objective, task.run)
@@ -267,7 +264,7 @@ def _on_fresh_roads(
     of_scenarios = isinstance(task.road, Scenarios)  # whose true risk counts, not a smooth one
     drive = driver(cars, task.objective.metrics, task.objective, task.run) if of_scenarios else by_search
     name = task.objective.name
-    return on_fresh_roads(drive, (cars, task.run), task.road, numbers, task.allowed, task.units, name)
+    return on_fresh_roads(drive, (cars, task.run), task.road, numbers, allowed, task.units, name)
 
 
 def _in_scenarios(
