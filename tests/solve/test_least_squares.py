@@ -108,10 +108,10 @@ def test_a_column_without_effect_leaves_a_finite_step():
     solver = BoundedLevenbergMarquardt(lower=np.full(2, -np.inf), upper=np.full(2, np.inf))
     rows = np.array([[[1.0, 0.0, 1.0], [0.0, 0.0, 0.5]]])
     nothing = np.zeros((1, 0)), np.zeros((1, 0, 2)), np.ones(1)
-    state = solver.init(None, np.zeros((1, 2)), None, {"linearise": None}, None, None, frozenset())
+    state = solver.init(print, np.zeros((1, 2)), None, {"linearise": None}, None, None, frozenset())
     state = state._replace(step_size=np.full(1, np.inf))
     options = {"linearise": lambda y, lanes: (Linearisation(rows, *nothing), None)}
-    _, state, _ = solver.step(None, np.zeros((1, 2)), np.arange(1), options, state, frozenset())
+    _, state, _ = solver.step(print, np.zeros((1, 2)), np.arange(1), options, state, frozenset())
     np.testing.assert_allclose(state.trial, [[-1.0, 0.0]], atol=1e-9)
     assert not state.stuck[0]
 
