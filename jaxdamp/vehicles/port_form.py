@@ -8,7 +8,7 @@ port is a row R of the geometry; its force acts through the same row, −Rᵀ F,
 """
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias, final
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, final
 
 import equinox as eqx
 import jax
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     AtPorts: TypeAlias = Any
 else:
     AtPorts = Float[Array, " ports"] | tuple[Scalar, ...]
+Numbers = TypeVar("Numbers", Array, np.ndarray)
 States = list[Array]  # by group: (states,) of a law alone, (laws, states) of a batch
 Earlier = tuple[list[Array | None], list[Array | None]]  # one and two steps before, of groups that are extrapolated
 
@@ -206,10 +207,16 @@ class PortForm(eqx.Module):
         ends = [2 * n, 2 * n + ports, 2 * n + ports + wheels]
         return LinearMap(*jnp.split(whole, ends, axis=1))
 
-    def at_ports(
-        self, coordinates: Float[Array, "*time q"], road: Float[Array, "*time wheels"]
-    ) -> Float[Array, "*time ports"]:
-        """Deflections of the elements from coordinates and road heights; their rates from the rates of both."""
+    def at_ports(self, coordinates: Numbers, road: Numbers) -> Numbers:
+        """Deflections of the elements from coordinates and road heights; their rates from the rates of both.
+
+        Arguments:
+            coordinates: shape (*time, q).
+            road: shape (*time, wheels).
+
+        Returns:
+            Shape (*time, ports).
+        """
         deflections = coordinates @ self.ports.T
         return deflections if self.port_road is None else deflections - road @ self.port_road.T
 
