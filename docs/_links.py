@@ -14,6 +14,7 @@ PAGES = {
     "ctypes.": PYTHON + "ctypes.html#{}",
     "os.": PYTHON + "os.html#{}",
     "pathlib.": PYTHON + "pathlib.html#{}",
+    "types.": PYTHON + "types.html#{}",
     "typing.": PYTHON + "typing.html#{}",
     "numpy.": NUMPY + "{}.html",
     "jax.": JAX + "{}.html",

@@ -14,12 +14,12 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int, PyTree
 
 
-Numbers: TypeAlias = Array | np.ndarray
-EachLane: TypeAlias = Float[Numbers, "*lanes"]
-LaneMask: TypeAlias = Bool[Numbers, "*lanes"]
-Unknowns: TypeAlias = Float[Numbers, "*lanes unknowns"]
-Triangles: TypeAlias = Float[Numbers, "*lanes columns columns"]
-_Carry: TypeAlias = tuple[Numbers, Numbers, Numbers, Numbers | np.bool_]
+AnyArray: TypeAlias = Array | np.ndarray
+EachLane: TypeAlias = Float[AnyArray, "*lanes"]
+LaneMask: TypeAlias = Bool[AnyArray, "*lanes"]
+Unknowns: TypeAlias = Float[AnyArray, "*lanes unknowns"]
+Triangles: TypeAlias = Float[AnyArray, "*lanes columns columns"]
+_Carry: TypeAlias = tuple[AnyArray, AnyArray, AnyArray, AnyArray | np.bool_]
 Flat = TypeVar("Flat", Array, np.ndarray)
 Tree = TypeVar("Tree")
 
@@ -47,10 +47,10 @@ class Linearisation(NamedTuple):
         samples: number of residuals, for the tolerance in standard errors.
     """
 
-    rows: Float[Numbers, "*lanes rows columns"]
-    margins: Float[Numbers, "*lanes conditions"]
-    margin_slopes: Float[Numbers, "*lanes conditions unknowns"]
-    samples: Numbers | int
+    rows: Float[AnyArray, "... rows columns"]
+    margins: Float[AnyArray, "... conditions"]
+    margin_slopes: Float[AnyArray, "... conditions unknowns"]
+    samples: AnyArray | int
 
 
 class State(NamedTuple):
@@ -59,14 +59,14 @@ class State(NamedTuple):
     trial: Unknowns  # the point to be tried
     triangle: Triangles  # of the rows of the accepted point
     scale: Unknowns  # of the damping: largest norms of the Jacobian's columns so far (MINPACK)
-    conditions: Float[Numbers, "*lanes conditions unknowns"]  # slopes of the conditions, of length one
-    least: Float[Numbers, "*lanes conditions"]  # of the conditions times a step
+    conditions: Float[AnyArray, "*lanes conditions unknowns"]  # slopes of the conditions, of length one
+    least: Float[AnyArray, "*lanes conditions"]  # of the conditions times a step
     step_size: EachLane  # inverse of the damping
     predicted: EachLane  # decrease of half the sum of squares at the point to be tried
     floor: EachLane  # of a decrease that counts
     short: LaneMask  # whether the step is shorter than the tolerances
     whole: LaneMask  # whether it is the step without damping
-    steps: Int[Numbers, "*lanes"]  # points tried
+    steps: Int[AnyArray, "*lanes"]  # points tried
     converged: LaneMask  # whether the search has ended by its tolerance
     stuck: LaneMask  # whether there is no further step
     aux: PyTree  # what the residual gives beside its value at the accepted point
@@ -84,15 +84,15 @@ class _Proposal(NamedTuple):
 class Rules(NamedTuple):
     """Bounds as vectors, and the tolerances of a `BoundedLevenbergMarquardt`."""
 
-    lower: Float[Numbers, " unknowns"] | float
-    upper: Float[Numbers, " unknowns"] | float
+    lower: Float[AnyArray, " unknowns"] | float
+    upper: Float[AnyArray, " unknowns"] | float
     tolerance: float
     precision: float
     rtol: float
     atol: float
 
 
-def _library(array: Numbers) -> ModuleType:
+def _library(array: AnyArray) -> ModuleType:
     return np if isinstance(array, np.ndarray) else jnp
 
 
@@ -135,7 +135,7 @@ def with_proposal(
     rules: Rules,
     state: State,
     y: Unknowns,
-    samples: Numbers | int,
+    samples: AnyArray | int,
     accepted: LaneMask,
 ) -> State:
     """The state with the next point to be tried."""
@@ -150,7 +150,7 @@ def with_proposal(
         short = xp.all(xp.abs(step) <= rules.atol + rules.rtol * xp.abs(y), axis=-1)
         return _Proposal(step, predicted, short, ~(predicted >= floor) | short)
 
-    def longer(carry: tuple[Numbers, Numbers, _Proposal]) -> tuple[Numbers, Numbers, _Proposal]:
+    def longer(carry: tuple[AnyArray, AnyArray, _Proposal]) -> tuple[AnyArray, AnyArray, _Proposal]:
         size, again, proposal = carry
         size = xp.where(again, size * MOST_GROWTH, size)
         proposal = where(xp, again, at(size), proposal)
@@ -182,14 +182,14 @@ def where(xp: ModuleType, mask: LaneMask, new: Tree, old: Tree) -> Tree:
     if xp is np and not np.any(mask):
         return old
 
-    def chosen(new: Numbers, old: Numbers) -> Numbers:
+    def chosen(new: AnyArray, old: AnyArray) -> AnyArray:
         return xp.where(mask.reshape(mask.shape + (1,) * (new.ndim - mask.ndim)), new, old)
 
     return jtu.tree_map(chosen, new, old)
 
 
 def _while(
-    xp: ModuleType, condition: Callable[[Tree], Numbers | np.bool_], body: Callable[[Tree], Tree], carry: Tree
+    xp: ModuleType, condition: Callable[[Tree], AnyArray | np.bool_], body: Callable[[Tree], Tree], carry: Tree
 ) -> Tree:
     if xp is jnp:
         return jax.lax.while_loop(condition, body, carry)
@@ -198,7 +198,7 @@ def _while(
     return carry
 
 
-def _triangle(xp: ModuleType, rows: Float[Numbers, "*lanes rows columns"]) -> Triangles:
+def _triangle(xp: ModuleType, rows: Float[AnyArray, "*lanes rows columns"]) -> Triangles:
     """The triangle of rows, with as many rows as columns."""
     missing = max(rows.shape[-1] - rows.shape[-2], 0)
     rows = xp.concatenate([rows, xp.zeros((*rows.shape[:-2], missing, rows.shape[-1]), rows.dtype)], axis=-2)
@@ -210,8 +210,8 @@ def _half_squares(triangle: Triangles) -> EachLane:
 
 
 def _times(
-    matrix: Float[Numbers, "*lanes rows columns"], vector: Float[Numbers, "*lanes columns"]
-) -> Float[Numbers, "*lanes rows"]:
+    matrix: Float[AnyArray, "*lanes rows columns"], vector: Float[AnyArray, "*lanes columns"]
+) -> Float[AnyArray, "*lanes rows"]:
     return (matrix @ vector[..., None])[..., 0]
 
 
@@ -242,7 +242,7 @@ def _damped_step(
     low = xp.concatenate([xp.broadcast_to(lower, scale.shape), state.least], axis=-1)
     high = xp.concatenate([xp.broadcast_to(upper, scale.shape), xp.full_like(state.least, np.inf)], axis=-1)
 
-    def solved(held: Numbers, at: Numbers) -> Numbers:
+    def solved(held: AnyArray, at: AnyArray) -> AnyArray:
         coordinates, rows, values = held[..., :n], held[..., n:], xp.where(held[..., :n], at[..., :n], 0.0)
         firmly = xp.where(rows, firm, 0.0)
         blocks = [
@@ -267,7 +267,7 @@ def _damped_step(
 
 
 def _back_substituted(
-    xp: ModuleType, triangle: Float[Numbers, "*lanes unknowns unknowns"], right: Unknowns
+    xp: ModuleType, triangle: Float[AnyArray, "*lanes unknowns unknowns"], right: Unknowns
 ) -> Unknowns:
     """X of R x = b; NaN where R is singular."""
     if xp is jnp:

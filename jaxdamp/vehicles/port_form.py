@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     AtPorts: TypeAlias = Any
 else:
     AtPorts = Float[Array, " ports"] | tuple[Scalar, ...]
-Numbers = TypeVar("Numbers", Array, np.ndarray)
+Kind = TypeVar("Kind", Array, np.ndarray)
 States = list[Array]  # by group: (states,) of a law alone, (laws, states) of a batch
 Earlier = tuple[list[Array | None], list[Array | None]]  # one and two steps before, of groups that are extrapolated
 
@@ -207,7 +207,7 @@ class PortForm(eqx.Module):
         ends = [2 * n, 2 * n + ports, 2 * n + ports + wheels]
         return LinearMap(*jnp.split(whole, ends, axis=1))
 
-    def at_ports(self, coordinates: Numbers, road: Numbers) -> Numbers:
+    def at_ports(self, coordinates: Kind, road: Kind) -> Kind:
         """Deflections of the elements from coordinates and road heights; their rates from the rates of both.
 
         Arguments:
