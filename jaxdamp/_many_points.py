@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxdamp.parameters import Domain, get, match_paths, named_parameters
+from jaxdamp.parameters import Domain, get, match_parameters, named_parameters
 
 
 Columns = Mapping[str, np.ndarray]
@@ -31,8 +31,9 @@ def outside_domains(tree: PyTree, columns: Columns) -> np.ndarray:
     >>> print(*outside_domains(Linear(1500.0), {"rate": np.array([-1.0, 2000.0])}), sep=";")
     rate must be positive [N s/m];
     """
-    known = {p.path: p for p in named_parameters(tree, columns)}
-    named = {path: np.asarray(column) for name, column in columns.items() for path in match_paths([*known], [name])}
+    every = named_parameters(tree, columns)
+    known = {p.path: p for p in every}
+    named = {path: np.asarray(column) for name, column in columns.items() for path in match_parameters(every, [name])}
     by_path = {path: column for path, column in named.items() if known[path].value.ndim == 0}
     reasons = np.full(len(next(iter(named.values()))), "", dtype=object)
     for path, column in by_path.items():

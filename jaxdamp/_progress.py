@@ -6,6 +6,8 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any, final
 
+from jaxdamp import _checks
+
 
 BAR = 20  # characters
 
@@ -72,6 +74,8 @@ def tell(
     what: str = "points",
 ) -> None:
     """Say how far work of many points is, by the function of the caller or in a line with the time left."""
+    if progress is not None and not callable(progress):
+        _checks.refuse("progress", "be a function of two numbers, or None for a line in the terminal", repr(progress))
     if progress is not None:
         progress(done, total)
     else:

@@ -39,6 +39,7 @@ from jaxdamp.parameters._paths import (
     check_parameters as check_parameters,
     checked as checked,
     get,
+    match_parameters as match_parameters,
     match_paths as match_paths,
     matched_in_words as matched_in_words,
     matching as matching,

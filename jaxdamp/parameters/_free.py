@@ -14,7 +14,14 @@ from jaxtyping import Array, Float, PyTree
 from jaxdamp import _checks
 from jaxdamp.parameters._declaration import Parameter
 from jaxdamp.parameters._domains import interval, ordered_interval
-from jaxdamp.parameters._paths import expression, match_paths, name_patterns, named_parameters, with_values
+from jaxdamp.parameters._paths import (
+    expression,
+    match_parameters,
+    match_paths,
+    name_patterns,
+    named_parameters,
+    with_values,
+)
 
 
 EXAMPLE = "Write for example tie={'front.damper.**': 'rear.damper.**'}: the front takes the values of the rear."
@@ -207,7 +214,7 @@ def free_parameters(
     if not known:
         remedy = "Declare its numbers by `parameter(unit, meaning)`; the weights of a network are trained by optax."
         _checks.refuse("law", "have parameters", f"a {type(tree).__name__} without", remedy)
-    keep = match_paths(known, names)
+    keep = match_parameters(all_parameters, names)
     frozen = match_paths(known, name_patterns("freeze", freeze))
     leaders = resolve_ties(all_parameters, tie)
 

@@ -123,9 +123,9 @@ def replace(tree: Tree, values: Mapping[str, object]) -> Tree:
     >>> float(replace(Linear(1500.0), {"rate": 2000.0}).rate)
     2000.0
     """
-    known = [p.path for p in named_parameters(tree, values)]
+    known = named_parameters(tree, values)
     return checked(
-        with_values(tree, {p: as_float(v) for name, v in values.items() for p in match_paths(known, [name])})
+        with_values(tree, {p: as_float(v) for name, v in values.items() for p in match_parameters(known, [name])})
     )
 
 
@@ -143,9 +143,24 @@ def named_parameters(tree: object, names: Iterable[str]) -> list[Parameter]:
     """
     every = parameters(tree, commands=True)
     paths = [p.path for p in every]
-    hits = [matching(paths, name) for name in names if "*" not in name.rpartition(".")[2]]
+    hits = [matching(paths, name) for name in names if _may_name_commands(name)]
     named = set(itertools.chain(*hits)) if all(hits) else set(paths)  # all are offered in place of a wrong name
     return [p for p in every if not p.command or p.path in named]
+
+
+def _may_name_commands(name: str) -> bool:
+    return "*" not in name.rpartition(".")[2]
+
+
+def match_parameters(known: Sequence[Parameter], names: Sequence[str]) -> list[str]:
+    """The paths that names and patterns stand for (`match_paths`), those of commands only by their own name.
+
+    Arguments:
+        known: of `named_parameters`.
+        names: names and patterns.
+    """
+    hits = [match_paths([p.path for p in known if not p.command or _may_name_commands(name)], [name]) for name in names]
+    return [p.path for p in known if any(p.path in paths for paths in hits)]
 
 
 def match_paths(known: Sequence[str], patterns: Sequence[str]) -> list[str]:

@@ -8,7 +8,7 @@ import numpy as np
 from jaxdamp._display import display
 from jaxdamp._tables import typeset_unit
 from jaxdamp._types import Axes
-from jaxdamp.plots import _rides, _sheet, _style, fitted_range
+from jaxdamp.plots import _axes, _rides, _sheet, _style, fitted_range
 from jaxdamp.plots._sketch import sketch
 from jaxdamp.plots.damping import ratios, wheel_axis
 from jaxdamp.rig import quasi_static
@@ -174,7 +174,7 @@ def damper(panels: Sequence[Axes], shown: _rides.Rides, path: str) -> None:
     _style.cross(curves)
     _style.dress(shares, "", "time [%]", _rides.quadrants(velocities[1]))
     for axes in panels:
-        _style.label_axis(axes, "x", "velocity [mm/s]   (+ rebound)", times=_MM)
+        _axes.label_axis(axes, "x", "velocity [mm/s]   (+ rebound)", times=_MM)
     curves.set_xlim(-reach, reach)
     if len(shown.styles()) > 1:
         drawn = [line for line in curves.get_lines() if not str(line.get_label()).startswith("_")]

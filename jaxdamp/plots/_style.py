@@ -1,7 +1,5 @@
 """House style of all pictures: what each colour means, names and digits for people, axes, legends, titles."""
 
-import functools
-import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -23,6 +21,7 @@ from jaxdamp._words import (
     typeset as typeset,
 )
 from jaxdamp.dampers import law_name as law_name
+from jaxdamp.plots._axes import label_axis, wrap
 
 
 if TYPE_CHECKING:
@@ -207,85 +206,6 @@ def dress(axes: Axes, x: str, y: str, title: str = "", *, turns: Literal["", "y"
     axes.grid(True, color="0.9", linewidth=0.8)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
-
-
-def label_axis(axes: Axes, name: Literal["x", "y"], label: str, *, turns: bool = False, times: float = 1.0) -> None:
-    """The label of one axis, and ticks in the unit and the sign that are shown, by the unit in the label.
-
-    Arguments:
-        axes: with the axis.
-        name: of the axis.
-        label: with its unit in brackets.
-        turns: whether its sign is that of the direction, also if the label does not say so.
-        times: the numbers drawn, times this, are in the unit of the label.
-    """
-    from matplotlib.ticker import FuncFormatter, MaxNLocator
-
-    axis = axes.xaxis if name == "x" else axes.yaxis
-    wrap(axis.set_label_text(display().text(label)), axes)
-    found = re.search(r"\[([^\[\]]+)\]", label)
-    shown = display().of(found[1] if found else "", signed=turns or "+" in display().text(label))
-    factor = times * shown.factor
-    if factor == 1.0 or axis.get_scale() != "linear":
-        return
-
-    class Ticks(MaxNLocator):
-        def tick_values(self, vmin: float, vmax: float) -> Any:
-            ends = sorted((factor * vmin, factor * vmax))
-            return np.sort(np.asarray(super().tick_values(*ends)) / factor)
-
-    axis.set_major_locator(Ticks(nbins="auto", steps=[1, 2, 2.5, 4, 5, 10]))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{round(factor * value, 9) + 0.0:g}".replace("-", "−")))
-    if factor < 0.0:
-        axis.set_inverted(True)
-        change = f"{name}lim_changed"
-        axes.callbacks.connect(change, lambda _: None if axis.get_inverted() else axis.set_inverted(True))
-
-
-_SLACK = 0.35  # inch, by which a title or label may be longer than its axes
-
-
-def wrap(text: "matplotlib.text.Text", axes: Axes) -> None:
-    """Break a title or label where it is longer than its axes, as wide as these are when they are drawn.
-
-    A sign in brackets stays with its word: (+ rebound).
-    """
-    text.set_text(re.sub(r"(?<=\([+−]) ", "\N{NO-BREAK SPACE}", text.get_text()))
-    text.set_wrap(True)
-    vars(text)["_get_wrap_line_width"] = functools.partial(_longest, text, axes)  # by default the width of the figure
-
-
-def _longest(text: "matplotlib.text.Text", axes: Axes) -> float:
-    """Pixels of the longest line of a title or label."""
-    figure = text.get_figure(root=True)
-    assert figure is not None
-    box, page, slack = axes.get_window_extent(), figure.bbox, _SLACK * figure.dpi
-    if text.get_rotation():
-        return box.height + slack
-    middle = 0.5 * (box.x0 + box.x1)
-    room = page.x1 - box.x0 if text.get_horizontalalignment() == "left" else 2.0 * min(middle, page.x1 - middle)
-    return min(box.width + slack, room)
-
-
-def few_ticks(axes: Axes, most: int) -> None:
-    """At most so many ticks along the abscissa, and no more than its labels have room for; in the unit that is shown.
-
-    Arguments:
-        axes: of any width.
-        most: ticks.
-    """
-    from matplotlib.ticker import MaxNLocator
-
-    before = axes.xaxis.get_major_locator()
-    assert isinstance(before, MaxNLocator)  # of a linear axis
-    before.set_params(steps=[1, 2, 2.5, 4, 5, 10])
-
-    class Ticks(MaxNLocator):
-        def tick_values(self, vmin: float, vmax: float) -> "Sequence[float]":
-            before.set_params(nbins=max(min(most, int(0.6 * axes.xaxis.get_tick_space())), 1))
-            return before.tick_values(vmin, vmax)
-
-    axes.xaxis.set_major_locator(Ticks())
 
 
 def cross(axes: Axes, horizontal: bool = True, vertical: bool = True) -> None:

@@ -20,7 +20,7 @@ from jaxdamp.bench import (
     as_runs,
     last_steady_cycle,
 )
-from jaxdamp.plots import _style
+from jaxdamp.plots import _axes, _style
 from jaxdamp.plots.loops import spread
 
 
@@ -268,7 +268,7 @@ def _dress(panels: Mapping[str, Axes]) -> None:
         if name not in "vx":
             axes.set_ylabel("")
         _style.cross(axes, vertical=name != "t")
-        _style.few_ticks(axes, 6)
+        _axes.few_ticks(axes, 6)
 
 
 def limit_check(check: LimitCheck) -> Figure:

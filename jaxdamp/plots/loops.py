@@ -11,7 +11,7 @@ from jaxdamp._tables import typeset_unit
 from jaxdamp._types import Figure
 from jaxdamp.bench import BenchRun, as_runs, last_steady_cycle
 from jaxdamp.identify import Comparison, FitResult, VehicleFit
-from jaxdamp.plots import _style
+from jaxdamp.plots import _axes, _style
 
 
 _MOST_POINTS, _PHASES = 300, 40  # of a residual over the velocity, and over the cycle
@@ -70,7 +70,7 @@ def fit_loops(result: FitResult, runs: BenchRun | Sequence[BenchRun] | None = No
     _style.dress(over_time, "time in the cycle, over its period [–]", label, over_cycle, turns="y")
     for axes in (loops, football, over_velocity):
         _style.cross(axes)
-        _style.few_ticks(axes, 7)
+        _axes.few_ticks(axes, 7)
     _style.cross(over_time, vertical=False)
     styles = [
         Line2D([], [], color=_style.GREY, linewidth=4.0, alpha=0.4, label="measured"),
@@ -117,12 +117,12 @@ def loops_by_law(comparison: Comparison, record: str | None = None) -> Figure:
         words = f"{_style.in_words(rung.name)}: {_style.short(rung.error)}\N{NO-BREAK SPACE}N{best}"
         _style.dress(axes, _style.VELOCITY, "force [N]", words, turns="y")
         _style.cross(axes)
-        _style.few_ticks(axes, 4)
+        _axes.few_ticks(axes, 4)
         axes.label_outer()
     for axes in panels.flat[len(shown) :]:
         axes.set_axis_off()
     for axes in panels.flat[max(len(shown) - columns, 0) : len(shown)]:
-        _style.wrap(axes.set_xlabel(display().text(_style.VELOCITY)), axes)
+        _axes.wrap(axes.set_xlabel(display().text(_style.VELOCITY)), axes)
         axes.tick_params(labelbottom=True)
     judged = "on motion held out" if comparison.best.judged_on else "on the fitted records"
     few = f", the best {len(shown)} of {len(rungs)} laws" * (len(shown) < len(rungs))

@@ -8,7 +8,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._tables import typeset_unit
 from jaxdamp._types import Axes, Dataset, Figure
-from jaxdamp.plots import _style
+from jaxdamp.plots import _axes, _style
 from jaxdamp.tune import limit_spans
 
 
@@ -165,7 +165,7 @@ def _map(
     shown = np.ma.masked_invalid(values)
     if shown.count() and shown.max() > shown.min():
         filled = plot.contourf(x, y, shown, LEVELS, cmap="viridis")
-        _style.label_axis(figure.colorbar(filled, ax=plot).ax, "y", _label(data, metric))
+        _axes.label_axis(figure.colorbar(filled, ax=plot).ax, "y", _label(data, metric))
         beyond = [end.beyond(data[end.name].transpose(over[1], over[0]).values) for end in ends]
         allowed = np.ma.masked_where(np.any(beyond, axis=0), shown) if beyond else shown
         if allowed.count():
@@ -232,7 +232,7 @@ def _plane(
         plot.plot(across, up, color="0.7", linewidth=0.8, zorder=1)
     shades = np.broadcast_to(data[over[0]].values[:, None], x.shape)
     points = plot.scatter(x, y, 22.0, shades, cmap=ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.75, 256))))
-    _style.label_axis(figure.colorbar(points, ax=plot).ax, "y", _label(data, over[0]))
+    _axes.label_axis(figure.colorbar(points, ax=plot).ax, "y", _label(data, over[0]))
     handles = []
     if forbidden.any():
         label = "\n".join(end.label for end in ends)

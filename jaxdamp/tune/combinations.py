@@ -21,6 +21,7 @@ class Combinations:
         metrics: of each combination, by name.
         met: which combinations meet all limits.
         units: of numbers and metrics.
+        impossible: number of further combinations, which the vehicle cannot have: the law refuses them.
         beside_next: by how much the best differs from the next best, in words; empty where there is none.
     """
 
@@ -28,15 +29,18 @@ class Combinations:
     metrics: dict[str, Float[np.ndarray, " combinations"]]
     met: Bool[np.ndarray, " combinations"]
     units: Mapping[str, str]
+    impossible: int = 0
     beside_next: str = ""
 
     @property
     def sentence(self) -> str:
-        """How many combinations there are, and how the best one stands beside the next."""
+        """The best combination, of how many, and how it stands beside the next."""
         count, met = len(self.met), int(np.count_nonzero(self.met))
         within = "" if met == count else f", of which {met} within the limits"
-        first = f"the best of {count} combinations{within}"
-        return ", ".join(filter(None, (first if met else f"of {count} the nearest to the limits", self.beside_next)))
+        without = f" ({self.impossible} more are impossible)" * bool(self.impossible)
+        first = f"{self.at(0)} is the best of {count} combination{'s' * (count > 1)}{without}{within}"
+        none = f"{self.at(0)} is the nearest to the limits of {count}"
+        return ", ".join(filter(None, (first if met else none, self.beside_next)))
 
     def at(self, place: int) -> str:
         """One combination in words, the best being the first."""

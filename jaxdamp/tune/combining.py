@@ -8,6 +8,7 @@ from typing import Any, final
 import jax.numpy as jnp
 import numpy as np
 
+from jaxdamp import _checks
 from jaxdamp.parameters import checked
 from jaxdamp.tune.combinations import Combinations
 from jaxdamp.tune.descending import Ended, missed
@@ -26,8 +27,10 @@ class Driven:
         ends: a search that ends at each of them.
     """
 
-    def __init__(self, evaluator: Evaluator, points: np.ndarray, progress: Callable[[int, float], None]) -> None:
-        self.task, self.ends, least = evaluator.task, list[Ended](), math.inf
+    def __init__(
+        self, evaluator: Evaluator, points: np.ndarray, impossible: int, progress: Callable[[int, float], None]
+    ) -> None:
+        self.task, self.ends, self._impossible, least = evaluator.task, list[Ended](), impossible, math.inf
         for part in np.array_split(points, math.ceil(len(points) / LANES)):
             evaluations = evaluator.at(part / self.task.space.unit)
             least = min(least, *(float(one.rows[0]) for one in evaluations))
@@ -49,31 +52,41 @@ class Driven:
         Arguments:
             limits: of the search.
         """
-        task, ends = self.task, sorted(self.ends, key=lambda one: rank(self.task, one, limits))
+        task, ranks = self.task, [rank(self.task, one, limits) for one in self.ends]
+        order = sorted(range(len(ranks)), key=lambda i: ranks[i])
+        ends = [self.ends[i] for i in order]
         each = [task.numbers(one.evaluation.values) for one in ends]
         names = dict.fromkeys([task.objective.name, *task.allowed])
         owners = zip(task.space.free.names, task.space.free.owners, strict=True)
         return Combinations(
             dict(zip(task.space.free.names, np.transpose([one.values for one in ends]), strict=True)),
             {name: np.array([numbers[name] for numbers in each]) for name in names},
-            np.array([not missed(limits, numbers, task.tolerance) for numbers in each]),
+            np.array([ranks[i][0] == 0.0 for i in order]),
             {name: task.units[name] for name in names} | {name: p.unit for name, p in owners},
+            self._impossible,
         )
 
 
 def every_combination(evaluator: Evaluator, progress: Callable[[int, float], None]) -> Driven | None:
-    """All combinations, driven, if choices are all that is free and there are not too many.
+    """All combinations that the vehicle can have, driven, if choices are all that is free and there are not too many.
 
     Arguments:
         evaluator: of the task.
         progress: called with the number of combinations driven and the least objective so far.
+
+    Raises:
+        ValueError: choices of which the vehicle can have no combination.
     """
     space = evaluator.task.space
     choices = [choice.values for choice in space.choices if choice is not None]
     if len(choices) < len(space.choices) or math.prod(map(len, choices)) > MOST_COMBINATIONS:
         return None
-    points = np.array([point for point in itertools.product(*choices) if _is_allowed(evaluator.task, point)])
-    return Driven(evaluator, points, progress)
+    every = list(itertools.product(*choices))
+    points = np.array([point for point in every if _is_allowed(evaluator.task, point)])
+    if not len(points):
+        names = ", ".join(space.free.names)
+        _checks.refuse("over", f"have a combination of {names} that the vehicle can have", f"none of {choices}")
+    return Driven(evaluator, points, len(every) - len(points), progress)
 
 
 def _is_allowed(task: DesignTask[Any], point: Sequence[float]) -> bool:

@@ -73,6 +73,8 @@ def minimise(
     Domains are always respected. A parameter that ends at a bound is named in the `warnings`: the optimum may be
     beyond.
 
+    Where all that is free is a `Choice`, every combination is driven instead (up to 2000).
+
     Arguments:
         metric: the name of a ride metric of the vehicle, such as `"rms_sprung_acceleration"`, or "comfort", "travel" or
             "grip" (`vehicle.goal_metrics`; of several metrics their mean); a `metrics.Metric` of any channel; or a

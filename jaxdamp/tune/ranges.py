@@ -16,6 +16,7 @@ from jaxdamp.parameters import (
     FreeParameters,
     Parameter,
     free_parameters,
+    match_parameters,
     match_paths,
     name_patterns,
     named_parameters,
@@ -206,10 +207,10 @@ def _given(argument: str, bounds: Mapping[str, Any], free: FreeParameters) -> di
     if not isinstance(bounds, Mapping):
         remedy = "Write `{'damper.rate': (1000.0, 5000.0)}`."
         _checks.refuse(argument, "be a mapping of parameters to bounds", _checks.described(bounds), remedy)
-    every, leaders, by_path = [p.path for p in named_parameters(free.tree, bounds)], dict(free.ties), {}
+    every, leaders, by_path = named_parameters(free.tree, bounds), dict(free.ties), {}
     paths = [p.path for p in free.chosen]
     for name, bound in bounds.items():
-        named = [leaders.get(path, path) for path in match_paths(every, [name])]
+        named = [leaders.get(path, path) for path in match_parameters(every, [name])]
         chosen = [path for path in named if path in paths]
         if not chosen:
             remedy = f"The free parameters are {', '.join(paths)}: add it to `over`, or leave its bounds out."

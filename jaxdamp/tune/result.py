@@ -84,7 +84,8 @@ class TuneResult(AbstractResult, Generic[V]):
         limits: largest allowed value of metrics, or the smallest and the largest one.
         active_limits: names of the metrics at their limit.
         warnings: doubts about the result, in words.
-        status: how the search ended; `CONVERGED` only if the gradient condition of an optimum is satisfied.
+        status: how the search ended; `CONVERGED` only if the gradient condition of an optimum is satisfied, or if every
+            combination of choices was driven.
         history: the metric after each step of the search.
         objective: the objective with all metrics of the tuning.
         active: the constraints that hold the search, in words: limits, shapes, bounds.

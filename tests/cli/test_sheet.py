@@ -37,7 +37,9 @@ def test_a_sheet_becomes_a_family_and_a_best_click(sheet: Path, monkeypatch: pyt
     ride = ("quarter_car_000", "iso:A", "--start", folder / "fit/best_law.json", "--duration", "1")
     few = ("--fresh-roads", "2")
     said = " ".join(jaxdamp("tune", *ride, *few, "--limit", "grip=+20%", "--out", folder / "tune").output.split())
-    assert "the best of 3 combinations" in said and "beside the next, damper.command = " in said and "2 fresh" in said
+    assert (
+        "is the best of 3 combinations" in said and "beside the next, damper.command = " in said and "2 fresh" in said
+    )
     assert "Shown in units metric" in said and "(from jaxdamp.toml)" in said
     rows = list(csv.DictReader((folder / "tune/combinations.csv").read_text().splitlines()))
     assert float(from_json(folder / "tune/law.json").command) == float(rows[0]["damper.command"])
@@ -46,7 +48,7 @@ def test_a_sheet_becomes_a_family_and_a_best_click(sheet: Path, monkeypatch: pyt
     comfort = [float(row[name]) for row in rows if row["limits"] == "met"]
     assert comfort == sorted(comfort) and len(comfort) > 1
     none = jaxdamp("tune", *ride, *few, "--limit", "grip=0.001", "--out", folder / "none", code=1).output
-    assert "Limit not met" in none and "of 3 the nearest to the limits" in " ".join(none.split())
+    assert "Limit not met" in none and "the nearest to the limits of 3" in " ".join(none.split())
 
 
 def test_what_says_nothing_of_a_sheet_is_refused(sheet: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import Ride, dampers, roads, sweep, tune, vehicles
-from jaxdamp.parameters import free_parameters, get
+from jaxdamp.parameters import free_parameters, get, replace
 
 
 COMFORT, TYRE = "rms_sprung_acceleration", "rms_dynamic_tyre_load"
@@ -66,15 +66,31 @@ def test_clicks_are_chosen_and_swept() -> None:
     assert float(get(result.vehicle, "damper.command")) == order[0] + 1
     gain = 100.0 * (comfort[order[0]] / comfort[order[1]] - 1.0)
     beside = f"beside the next, damper.command = {order[1] + 1}: {gain:+.1f} %"
-    assert f"the best of 6 combinations, of which 3 within the limits, {beside}" in result.summary and result.converged
+    best = f"damper.command = {order[0] + 1} is the best of 6 combinations, of which 3 within the limits, {beside}"
+    assert best in result.summary and result.converged
     assert result.to_dict()["combinations"]["rows"][0]["limits"] == "met"
     with pytest.raises(ValueError, match=r"No parameter is named 'damper.comand': did you mean 'damper.command'"):
         tune.minimise(COMFORT, car, WHITE, over=["damper.comand"])
     two = vehicles.presets.half_car_002(law)
     tie, named = {"front.*.command": "rear.*.command"}, ["rear.damper.command"]
-    assert free_parameters(two, over=["**.command"], tie=tie).names == named != free_parameters(two, over=["**"]).names
+    assert free_parameters(two, over=["**.command"], tie=tie).names == named
+    patterns = [free_parameters(two, over=over, tie=ties).names for over in (["**"], None) for ties in (tie, None)]
+    assert patterns == [patterns[0]] * 4 and not any("command" in name for name in patterns[0])
+    changed = replace(car, {"damper.command": 3.0, "damper.**": 500.0})  # whatever the order
+    assert float(get(changed, "damper.command")) == 3.0 and float(get(changed, "damper.laws.2.rate")) == 500.0
     between = tune.minimise(COMFORT, car, WHITE, over=["damper.command"])  # any current between two
     assert between.parameters[0].lower == 1.0 and between.parameters[0].upper == 6.0
+
+
+def test_combinations_that_a_law_refuses_are_left_out_and_counted() -> None:
+    law = dampers.PiecewiseLinear(np.array([-0.3, 0.1]), np.array([1500.0, 2500.0, 1500.0]))
+    car = vehicles.presets.quarter_car_000(law)
+    result = tune.minimise(COMFORT, car, WHITE, over={"knots": tune.Choice([-0.5, 0.2, 0.5])})  # knots increase
+    assert result.combinations is not None and len(result.combinations.met) == 3
+    assert "is the best of 3 combinations (6 more are impossible)" in result.summary
+    car = vehicles.presets.quarter_car_000(dampers.PiecewiseLinear(np.array([-0.3, 0.1, 0.2]), np.full(4, 1500.0)))
+    with pytest.raises(ValueError, match=r"`over` must have a combination of damper.knots.* that the vehicle can have"):
+        tune.minimise(COMFORT, car, WHITE, over={"knots": tune.Choice([-0.5, 0.5])})
 
 
 def test_wrong_choices_are_refused() -> None:
