@@ -118,10 +118,10 @@ def minimise(
     evaluator = Evaluator(task, asked["starts"])
     starts = start_points(task.space, asked["starts"], asked["seed"]) / task.space.unit
     evaluations, limits = evaluator.begin(starts)
-    task.refuse_constant(evaluations[0])
     with Progress("Tuning") as shown:
         progress = progress or (lambda step, value: shown(f"step {step}, {name} {value:.5g}"))
         combining = every_combination(evaluator, progress)
+        task.refuse_constant(evaluations[0], [one.evaluation for one in combining.ends] if combining else ())
         descent = combining or Descent(evaluator, max_steps, progress)
         several = descent.search(starts, evaluations, limits)
         ended = _best(descent, several, limits)

@@ -174,9 +174,11 @@ class DesignTask(Generic[V]):
         spans = {name: allowed.at(before[name]) for name, allowed in self.allowed.items()}
         return {name: span[1] if np.isinf(span[0]) else span for name, span in spans.items()}
 
-    def refuse_constant(self, start: Evaluation) -> None:
-        """Refuse objectives that do not depend on what is free."""
-        if not start.slopes[: len(self.objective.names)].any():
+    def refuse_constant(self, start: Evaluation, others: Sequence[Evaluation] = ()) -> None:
+        """Refuse objectives that do not depend on what is free: by their slopes, and by their values elsewhere."""
+        count, rounding = len(self.objective.names), 100.0 * self.tolerance.rounding
+        alike = [np.allclose(one.rows[:count], start.rows[:count], rounding, 0.0) for one in others]
+        if not start.slopes[:count].any() and all(alike):
             before = self.numbers(start.values)
             values = ", ".join(f"{name} = {before[name]:.4g}" for name in self.objective.names)
             remedy = "Free a parameter that it depends on, or take a road on which it does."

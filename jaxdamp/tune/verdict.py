@@ -316,8 +316,11 @@ def workshop_notes(space: SearchRange) -> list[str]:
 
 
 def without_effect(space: SearchRange, sides: tuple[Evaluation, Evaluation], ended: np.ndarray) -> tuple[str, ...]:
-    """The parameters by which the derivative of the metric is zero at the start and at the end, but for rounding."""
-    idle = np.ones(len(ended), bool)
+    """The parameters by which the derivative of the metric is zero at the start and at the end, but for rounding.
+
+    Choices are left out: other values may have an effect.
+    """
+    idle = ~space.is_choice
     for at, (_, rows, slopes) in zip((space.start, ended), sides, strict=True):
         rounded = np.abs(slopes[0] * at / space.unit) <= _ROUNDING * abs(rows[0])
         idle &= (slopes[0] == 0.0) | (rounded & (at != 0.0))

@@ -88,9 +88,22 @@ def test_combinations_that_a_law_refuses_are_left_out_and_counted() -> None:
     result = tune.minimise(COMFORT, car, WHITE, over={"knots": tune.Choice([-0.5, 0.2, 0.5])})  # knots increase
     assert result.combinations is not None and len(result.combinations.met) == 3
     assert "is the best of 3 combinations (6 more are impossible)" in result.summary
-    car = vehicles.presets.quarter_car_000(dampers.PiecewiseLinear(np.array([-0.3, 0.1, 0.2]), np.full(4, 1500.0)))
+    three = dampers.PiecewiseLinear(np.array([-0.3, 0.1, 0.2]), np.array([1500.0, 2500.0, 1500.0, 900.0]))
+    car = vehicles.presets.quarter_car_000(three)
     with pytest.raises(ValueError, match=r"`over` must have a combination of damper.knots.* that the vehicle can have"):
         tune.minimise(COMFORT, car, WHITE, over={"knots": tune.Choice([-0.5, 0.5])})
+
+
+def test_choices_without_effect_at_the_start_are_driven() -> None:
+    """Knots that the motion does not reach at the start have no slope there, and yet are no choice of nothing."""
+    law = dampers.PiecewiseLinear(np.array([-5.0, 5.0]), np.array([800.0, 2500.0, 800.0]))
+    car, bump = vehicles.presets.quarter_car_000(law), roads.cosine_bump(0.03, start=0.02, duration=0.1)
+    run = tune.Run(duration=0.3, dt=2e-3)
+    result = tune.minimise(COMFORT, car, bump, over={"knots": tune.Choice([-5.0, -0.05, 0.05, 5.0])}, **run)
+    assert result.after[COMFORT] < 0.95 * result.before[COMFORT] and not result.without_effect
+    far = tune.Choice([-6.0, -5.0, 5.0, 6.0])
+    with pytest.raises(ValueError, match="`metric` must depend on what is free"):
+        tune.minimise(COMFORT, car, bump, over={"knots": far}, **run)
 
 
 def test_wrong_choices_are_refused() -> None:
