@@ -95,15 +95,16 @@ def test_combinations_that_a_law_refuses_are_left_out_and_counted() -> None:
 
 
 def test_choices_without_effect_at_the_start_are_driven() -> None:
-    """Knots that the motion does not reach at the start have no slope there, and yet are no choice of nothing."""
-    law = dampers.PiecewiseLinear(np.array([-5.0, 5.0]), np.array([800.0, 2500.0, 800.0]))
-    car, bump = vehicles.presets.quarter_car_000(law), roads.cosine_bump(0.03, start=0.02, duration=0.1)
-    run = tune.Run(duration=0.3, dt=2e-3)
-    result = tune.minimise(COMFORT, car, bump, over={"knots": tune.Choice([-5.0, -0.05, 0.05, 5.0])}, **run)
-    assert result.after[COMFORT] < 0.95 * result.before[COMFORT] and not result.without_effect
-    far = tune.Choice([-6.0, -5.0, 5.0, 6.0])
+    """A stop that the stroke does not reach has no slope by its clearance, and yet another clearance has an effect."""
+    stop = dampers.BumpStop(clearance=0.5, stiffness=2e5)
+    car = vehicles.presets.quarter_car_000(dampers.Linear(1500.0) + stop)
+    bump, run = roads.cosine_bump(0.03, start=0.02, duration=0.1), tune.Run(duration=0.3, dt=2e-3)
+    travel = "working_space_peak_to_peak"
+    result = tune.minimise(travel, car, bump, over={"clearance": tune.Choice([0.001, 0.5, 0.6])}, **run)
+    assert result.parameters[0].after == 0.001 and result.after[travel] < 0.95 * result.before[travel]
+    assert not result.without_effect
     with pytest.raises(ValueError, match="`metric` must depend on what is free"):
-        tune.minimise(COMFORT, car, bump, over={"knots": far}, **run)
+        tune.minimise(travel, car, bump, over={"clearance": tune.Choice([0.5, 0.6])}, **run)
 
 
 def test_wrong_choices_are_refused() -> None:
