@@ -4,7 +4,7 @@ dyno file → damper law with hysteresis → vehicle on a road → ride metric �
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ _HOMES = {
 }
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """Everything is imported when it is first used, so that the command line answers at once."""
     if name == "__version__":
         from importlib.metadata import PackageNotFoundError, version

@@ -45,7 +45,7 @@ class Setting:
     """
 
     argument: str
-    value: Any = ...
+    value: object = ...
 
     def __str__(self) -> str:
         return f"{self.argument}={_literal(self.value)}"
@@ -69,7 +69,7 @@ def refuse(argument: str, must: str, value: object, remedy: str = "", *settings:
     raise ArgumentError(message, *settings, argument=argument)
 
 
-def summary(value: Any, wrong: Any = None) -> Any:
+def summary(value: Any, wrong: np.ndarray | None = None) -> object:
     """A value as shown in a message: of many numbers only their count and the first wrong one.
 
     Arguments:
@@ -178,7 +178,7 @@ def described(value: Any) -> str:
     return f"{article} {name}" + (f" of shape {np.shape(value)}" if hasattr(value, "shape") else "")
 
 
-def instance(argument: str, value: Any, kinds: type | tuple[type, ...], must: str, remedy: str = "") -> None:
+def instance(argument: str, value: object, kinds: type | tuple[type, ...], must: str, remedy: str = "") -> None:
     """Refuse an object of a wrong type, such as a road instead of a vehicle."""
     if not isinstance(value, kinds):
         refuse(argument, must, described(value), remedy)

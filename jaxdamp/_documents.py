@@ -3,8 +3,11 @@
 import json
 import re
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
+
+from jaxdamp._tables import Contents
 
 
 LARGEST = 2**24  # bytes; a law with a network of a million weights
@@ -13,7 +16,7 @@ _PART = r"(?:\"[^\"\n]*\"|'[^'\n]*'|[\w-]+)"
 _DEEP = re.compile(rf"^[ \t\[]*{_PART}(?:[ \t]*\.[ \t]*{_PART}){{{DEEPEST}}}", re.MULTILINE)
 
 
-def read_toml(file: Path) -> dict[str, Any]:
+def read_toml(file: Path) -> Contents:
     """What a TOML file says.
 
     Raises:
@@ -28,14 +31,14 @@ def read_toml(file: Path) -> dict[str, Any]:
         raise ValueError(f"{file} is no valid TOML: {_said(error)}.") from error
 
 
-def parse_json(text: str, **options: Any) -> Any:
-    """What a JSON text says, with the options of `json.loads`.
+def parse_json(text: str, refuse: Callable[[str], NoReturn] | None = None) -> Any:
+    """What a JSON text says; `refuse` raises what is said of NaN and infinity.
 
     Raises:
         ValueError: no JSON, or nested too deeply.
     """
     try:
-        return json.loads(text, **options)
+        return json.loads(text, parse_constant=refuse)
     except (json.JSONDecodeError, RecursionError) as error:
         raise ValueError(_said(error)) from error
 

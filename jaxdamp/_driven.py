@@ -1,7 +1,6 @@
 """States of ordinary differential equations by the solvers of diffrax; imported when asked for."""
 
 from collections.abc import Callable
-from typing import Any
 
 import diffrax
 import equinox as eqx
@@ -116,7 +115,7 @@ def driven_states(
     rtol: float,
     atol: float,
     mode: Mode = "forward",
-) -> tuple[Float[Array, "time states"], Any]:
+) -> tuple[Float[Array, "time states"], PyTree]:
     """States at the instants, ẏ = rate(x, v, y), and the solver's verdict.
 
     The stroke is cubic between the instants and v its derivative; steps end at the instants, where v has kinks.

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from importlib import import_module
 from types import ModuleType
-from typing import Any, NoReturn
+from typing import NoReturn
 
 
 GUESSES = {  # what people look for, and where it is
@@ -71,7 +71,7 @@ def answer_old_names(module: str, public: Sequence[str], homes: Mapping[str, str
         homes: for each old name the module of the package that defines it.
     """
 
-    def find(name: str) -> Any:
+    def find(name: str) -> object:
         if name not in homes:
             answer(module, name, public)
         text = f"`{module}.{name}` is no public name any more: objects of it are returned, not made."

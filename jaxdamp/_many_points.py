@@ -1,8 +1,7 @@
 """Points of a sweep at which a parameter of a module is outside its domain."""
 
 import dataclasses
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
 
 import equinox as eqx
 import jax
@@ -10,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxdamp.parameters import Domain, get, match_parameters, named_parameters
+from jaxdamp.parameters import Domain, DomainOf, get, match_parameters, named_parameters
 
 
 Columns = Mapping[str, np.ndarray]
@@ -62,11 +61,11 @@ def _above(path: str) -> list[str]:
     return [".".join(parts[:count]) for count in range(len(parts))]
 
 
-def _domains_by_value(module: PyTree) -> dict[str, Any]:
+def _domains_by_value(module: PyTree) -> dict[str, Callable[[PyTree], Domain]]:
     """The domains that are functions of the module, by field."""
     fields = dataclasses.fields(module) if dataclasses.is_dataclass(module) else ()
     declared = {f.name: f.metadata.get("parameter") or f.metadata.get("setting") or {} for f in fields}
-    domains = {name: has.get("domain") for name, has in declared.items()}
+    domains: dict[str, DomainOf | None] = {name: has.get("domain") for name, has in declared.items()}
     return {name: domain for name, domain in domains.items() if callable(domain) and not isinstance(domain, Domain)}
 
 
@@ -97,7 +96,7 @@ def _judge_together(module: PyTree, start: str, below: Columns, reasons: np.ndar
     reasons[left] = found[places.ravel()]
 
 
-def _refusal(check: Any, module: PyTree) -> str:
+def _refusal(check: Callable[[PyTree], object], module: PyTree) -> str:
     """What a check says, without the value; nothing if it passes."""
     try:
         check(module)

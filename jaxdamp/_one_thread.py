@@ -8,15 +8,19 @@ import functools
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING
+
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController, _ThreadpoolLimiter
 
 
 _lock = threading.Lock()
-_open: list[Any] = []  # one entry for each fit that runs, the first with the limit to lift
+_open: list["_ThreadpoolLimiter | None"] = []  # one entry for each fit that runs, the first with the limit to lift
 
 
 @functools.cache
-def _controller() -> Any:
+def _controller() -> "ThreadpoolController":
     from threadpoolctl import ThreadpoolController  # looks up the loaded libraries, once
 
     return ThreadpoolController()

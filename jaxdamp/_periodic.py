@@ -5,11 +5,11 @@ multipliers, the eigenvalues of J, say whether small disturbances die out.
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float, Int, PyTree
 
 from jaxdamp._matrices import solve
 from jaxdamp._root import ImplicitDerivatives
@@ -23,8 +23,10 @@ MOST_ROUNDS = 80
 DOUBLINGS = 14  # of the number of periods after which a disturbance is looked at
 GROWN = 1e6
 
-Setting: TypeAlias = Any
+Setting: TypeAlias = PyTree
 Period: TypeAlias = Callable[[State, Setting], tuple[State, State]]  # P(s), and the scale of each entry
+
+Inputs: TypeAlias = tuple[State, Period, Setting]
 
 
 class Shot(NamedTuple):
@@ -96,12 +98,12 @@ def steady_state(period: Period, start: State, setting: Setting) -> State:
     return jax.lax.while_loop(going, again, search).state
 
 
-def _as_it_is(inputs: Any) -> tuple[State, tuple[()]]:
+def _as_it_is(inputs: Inputs) -> tuple[State, tuple[()]]:
     return inputs[0], ()
 
 
-def _missing(state: State, _: Any, inputs: Any) -> State:
-    _, period, setting, *_ = inputs
+def _missing(state: State, _: object, inputs: Inputs) -> State:
+    _, period, setting = inputs
     return period(state, setting)[0] - state
 
 

@@ -6,6 +6,7 @@ the numbers are those of `jax.random`.
 """
 
 import math
+from typing import TYPE_CHECKING, Any
 
 import jax
 import jax.numpy as jnp
@@ -15,6 +16,10 @@ from jaxtyping import Array, Float, UInt32
 
 from jaxdamp import _checks
 from jaxdamp._forked import refuse_fork
+
+
+if TYPE_CHECKING:
+    import scipy.stats
 
 
 _MASK = 0xFFFFFFFF
@@ -74,6 +79,14 @@ def rayleigh(above: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
     With a phase phi of its own r (cos phi, sin phi) are two independent normal numbers of variance 1/2.
     """
     return jnp.sqrt(-jnp.log(jnp.clip(above, _FEWEST, 1.0)))
+
+
+def sobol_sequence(variables: int, seed: int) -> "scipy.stats.qmc.Sobol":
+    """A scrambled Sobol sequence of so many variables."""
+    from scipy.stats import qmc
+
+    options: dict[str, Any] = {"seed": np.random.default_rng(seed)}  # SciPy 1.15 calls it `rng`, and still takes this
+    return qmc.Sobol(variables, **options)
 
 
 def sign(seed: int | Array, shape: tuple[int, ...]) -> Float[Array, "..."]:

@@ -5,7 +5,7 @@ import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from jaxdamp import _checks
 from jaxdamp._status import Status
@@ -13,19 +13,22 @@ from jaxdamp._tables import Contents, Table, plain, with_unit
 from jaxdamp._types import Figure
 
 
-class Derived:
+T = TypeVar("T")
+
+
+class Derived(Generic[T]):
     """An attribute that follows from the others, unless a class stores it in a field or defines it anew.
 
     Unlike a property it is no default of a dataclass field of the same name, and gives way to it.
     """
 
-    def __init__(self, function: Callable[[Any], Any]) -> None:
+    def __init__(self, function: Callable[[Any], T]) -> None:
         self.function, self.__doc__ = function, function.__doc__
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
 
-    def __get__(self, instance: object, owner: type | None = None) -> Any:
+    def __get__(self, instance: object, owner: type | None = None) -> T:
         """The value; a class has none."""
         if instance is None:
             raise AttributeError(f"{self.name} belongs to a result, not to its class")
@@ -119,6 +122,7 @@ def plotted(
     kinds: Mapping[str, Callable[..., Figure]],
     result: "AbstractResult",
     before: str = "",
+    /,
     **options: object,
 ) -> Figure:
     """The picture of a result of the kind that `result.plot(kind)` names.

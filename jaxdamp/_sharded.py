@@ -23,7 +23,7 @@ def varying_as(tree: Tree, *others: object) -> Tree:
     return jax.tree.map(varying, tree) if axes else tree
 
 
-def _axes(leaf: object) -> frozenset[Any]:
+def _axes(leaf: object) -> frozenset[object]:
     if not isinstance(leaf, jax.Array):
         return frozenset()
     kind: Any = jax.typeof(leaf)

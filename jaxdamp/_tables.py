@@ -291,12 +291,12 @@ def comparison_table(
     return Table(title, columns, tuple(cells))
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> Any:
     """Numbers, words, lists, records and dictionaries as JSON has them; numbers that are not finite become None."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
-    if hasattr(value, "_asdict"):
-        return plain(value._asdict())
+    if as_dict := getattr(value, "_asdict", None):
+        return plain(as_dict())
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
     if value is None or isinstance(value, str | bool | int):

@@ -8,7 +8,7 @@ import functools
 import inspect
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import NamedTuple, TypeVar, cast
 
 import equinox as eqx
 import jax
@@ -25,7 +25,7 @@ from jaxdamp._forked import refuse_fork
 
 
 Tree = TypeVar("Tree")
-Function = TypeVar("Function", bound=Callable[..., Any])
+Function = TypeVar("Function", bound=Callable[..., object])
 
 
 class Behind(NamedTuple):
@@ -123,7 +123,7 @@ def of_known_numbers(function: Function) -> Function:
     signature = inspect.signature(function)
 
     @functools.wraps(function)
-    def call(*args: object, **kwargs: Any) -> Any:
+    def call(*args: object, **kwargs: object) -> object:
         refuse_fork()
         if is_traced((args, kwargs)):
             from jaxdamp import _checks

@@ -1,6 +1,6 @@
 """Array types with meaning. Shapes are checked at run time in the tests only."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -9,7 +9,9 @@ from jaxtyping import ArrayLike, Float
 
 
 if TYPE_CHECKING:
+    import matplotlib.artist
     import matplotlib.axes
+    import matplotlib.container
     import matplotlib.figure
     import xarray
 
@@ -17,10 +19,13 @@ Scalar = Float[Array, ""]
 State = Float[Array, " state"]
 Signal = Float[Array, " time"]
 VectorLike = Float[Array, " _"] | Float[np.ndarray, " _"] | Sequence[float]
+Value: TypeAlias = ArrayLike | Sequence[float]  # of a parameter
+Point: TypeAlias = Mapping[str, Value]  # by path
 SignalLike = Float[Array, " time"] | Float[np.ndarray, " time"]
 
 # Names of packages that are imported late, for annotations: texts at run time.
 Axes: TypeAlias = "matplotlib.axes.Axes"
+Artist: TypeAlias = "matplotlib.artist.Artist | matplotlib.container.Container"
 Figure: TypeAlias = "matplotlib.figure.Figure"
 DataArray: TypeAlias = "xarray.DataArray"
 Dataset: TypeAlias = "xarray.Dataset"

@@ -7,21 +7,21 @@ one would write by hand; without the compiler options of `jaxdamp.configure`, on
 import enum
 import operator
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp._types import Scalar, ScalarLike
 
 
 # One array or a tuple of scalars, rows of them for a matrix, as `MemoryLayout` says.
 if TYPE_CHECKING:
-    SmallVector: TypeAlias = Any
-    Matrix: TypeAlias = Any
+    SmallVector: TypeAlias = PyTree
+    Matrix: TypeAlias = PyTree
 else:
     SmallVector = Float[Array, " _"] | tuple[Scalar, ...]
     Matrix = Float[Array, "_ _"] | tuple[tuple[Scalar, ...], ...]
@@ -53,7 +53,7 @@ def rows(matrix: Float[Array, "_ _"]) -> tuple[tuple[Scalar, ...], ...]:
     return tuple(scalars(matrix[i]) for i in range(matrix.shape[0]))
 
 
-def laid_out(values: Array, layout: MemoryLayout) -> Any:
+def laid_out(values: Array, layout: MemoryLayout) -> SmallVector | Matrix:
     """A vector or a matrix in a layout."""
     if layout is MemoryLayout.ARRAY:
         return values
@@ -110,7 +110,7 @@ def between(one: SmallVector, other: SmallVector, share: ScalarLike) -> SmallVec
     return _entrywise(lambda a, b: a + share * (b - a), one, other)
 
 
-def _entrywise(function: Callable[..., Any], *vectors: SmallVector) -> SmallVector:
+def _entrywise(function: Callable[..., Scalar], *vectors: SmallVector) -> SmallVector:
     if isinstance(vectors[0], tuple):
         return tuple(function(*entries) for entries in zip(*vectors, strict=True))
     return function(*vectors)
@@ -120,7 +120,7 @@ def _dot(row: Sequence[Scalar], vector: SmallVector) -> Scalar:
     return _sum([a * b for a, b in zip(row, vector, strict=True)])
 
 
-def _sum(parts: Sequence[Any]) -> Any:
+def _sum(parts: Sequence[Scalar]) -> Scalar:
     total = parts[0] if parts else jnp.zeros(())  # a vehicle without elements has sums of nothing
     for part in parts[1:]:
         total = total + part

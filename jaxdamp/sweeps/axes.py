@@ -5,11 +5,12 @@ import functools
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._random import sobol_sequence
 from jaxdamp._traced import of_known_numbers
 
 
@@ -221,10 +222,7 @@ def _uniform(seed: int, axes: int, first: int, count: int) -> np.ndarray:
 
 def _sobol(seed: int, axes: int, first: int, count: int) -> np.ndarray:
     """Consecutive points of the scrambled sequence."""
-    from scipy.stats import qmc
-
-    scrambling: Any = {"seed": np.random.default_rng(seed)}  # SciPy 1.15 calls it `rng`, and still takes this name
-    sequence = qmc.Sobol(axes, **scrambling)
+    sequence = sobol_sequence(axes, seed)
     if first:
         sequence.fast_forward(first)
     with warnings.catch_warnings(action="ignore"):  # that the number of points is no power of two

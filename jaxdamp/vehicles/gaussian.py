@@ -9,6 +9,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp._limits import at_least
 from jaxdamp._matrices import phi_functions, solve
+from jaxdamp._random import sobol_sequence
 
 
 _DOUBLINGS = 50  # of the first interval, until nothing is left of the start
@@ -118,9 +119,8 @@ def _others(variables: int) -> tuple[np.ndarray, np.ndarray]:
         product = functools.reduce(np.multiply.outer, [weights] * variables).ravel()
         return grid, product / product.sum()
     import scipy.special
-    import scipy.stats
 
-    half = scipy.special.ndtri(scipy.stats.qmc.Sobol(variables, rng=0).random(_MANY // 2))
+    half = scipy.special.ndtri(sobol_sequence(variables, 0).random(_MANY // 2))
     points = np.concatenate([half, -half])
     spread = np.linalg.cholesky(points.T @ points / len(points))
     return np.linalg.solve(spread, points.T).T, np.full(len(points), 1.0 / len(points))
