@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 
 # Only what IEEE 754 defines to the last bit: the text must not depend on the machine that prints it.
-_EXACT: dict[str, Callable[..., Any]] = {
+_EXACT: dict[str, Callable[..., object]] = {
     "add": np.add,
     "sub": np.subtract,
     "mul": np.multiply,
@@ -33,7 +33,7 @@ _EXACT: dict[str, Callable[..., Any]] = {
 }
 
 
-def folded(operation: str, values: Sequence[Any], dtype: str) -> Any:
+def folded(operation: str, values: Sequence[Any], dtype: str) -> object:
     """The result of an operation on known numbers; `None` if it is left to the program."""
     if operation == "convert":
         return np.asarray(values[0]).astype(dtype)[()]
@@ -244,7 +244,7 @@ class Writer:
         self.put(Loop(body))
 
 
-def _number(atom: Constant) -> Any:
+def _number(atom: Constant) -> object:
     kind = np.dtype(atom.dtype).type
     if atom.dtype == "bool":
         return kind(atom.text == "True")

@@ -2,8 +2,9 @@
 
 import dataclasses
 import inspect
+from collections.abc import Callable
 from importlib import import_module
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import jax
 
@@ -19,7 +20,7 @@ class NamedFunction:
     name: str
     argument: str = ""
 
-    def function(self) -> Any:
+    def function(self) -> Callable[..., object]:
         """The function itself."""
         there = getattr(import_module(self.module), self.name)
         return inspect.signature(there).parameters[self.argument].default if self.argument else there
@@ -28,7 +29,7 @@ class NamedFunction:
 _PLACES = [NamedFunction("equinox.nn", "MLP", argument) for argument in ("activation", "final_activation")]
 
 
-def by_name(leaf: object) -> Any:
+def by_name(leaf: object) -> object:
     """A public function of JAX or a default of equinox as its name; anything else as it is."""
     if not callable(leaf):
         return leaf

@@ -7,7 +7,7 @@ extension: a passive law dissipates energy, ∮ F v dt ≥ 0. One instance is on
 import dataclasses
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, SupportsIndex
 
 import equinox as eqx
 import jax
@@ -50,7 +50,7 @@ class AbstractDamper(Module):
     # By identity, whatever is equal, as JAX asks of a function: `jax.jit(law.force)`.
     __hash__ = object.__hash__  # pyright: ignore[reportAssignmentType]
 
-    def __reduce_ex__(self, protocol: Any) -> Any:
+    def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[object, ...]:
         """Functions of JAX, such as the activation of a network, travel by their names: JAX pickles few of them."""
         named = jax.tree.map(by_name, self)
         if any(new is not old for new, old in zip(*map(jax.tree.leaves, (named, self)), strict=True)):

@@ -3,7 +3,7 @@
 import dataclasses
 import inspect
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from jaxtyping import PyTree
@@ -11,6 +11,9 @@ from jaxtyping import PyTree
 from jaxdamp import _checks
 from jaxdamp._traced import row, rows
 from jaxdamp._types import ScalarLike
+
+
+T = TypeVar("T")
 
 
 class Traits(NamedTuple):
@@ -75,7 +78,7 @@ class Reach(NamedTuple):
     velocity: float  # largest magnitude [m/s]
 
 
-def from_samples(make: Callable[..., Any], runs: Sequence[object]) -> Any:
+def from_samples(make: Callable[..., T], runs: Sequence[object]) -> T:
     """The law that a function makes from the samples of all records one after the other.
 
     The function gets velocity and force as its first two arguments, and `stroke` and `time` if it has arguments of

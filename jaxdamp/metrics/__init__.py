@@ -36,8 +36,6 @@ cannot be compiled.
 Array([0.707107, 1.414214, 2.828427], dtype=float64)
 """
 
-from typing import Any
-
 from jaxdamp.metrics._linear_system import StateSpace as StateSpace
 from jaxdamp.metrics.amplitude import (
     crest_factor,
@@ -168,7 +166,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """A renamed function by its old name."""
     if name in RENAMED:
         return globals()[current_name(name, RENAMED.values())]

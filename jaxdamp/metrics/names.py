@@ -71,7 +71,7 @@ def current_names(argument: str, names: Sequence[str], known: Collection[str]) -
 
 @final
 @jax.tree_util.register_pytree_with_keys_class
-class MetricValues(dict):
+class MetricValues(dict[str, Any]):
     """Values of metrics by name: a `dict` that accepts renamed metrics and suggests the nearest name to a wrong one.
 
     For JAX it is a pytree of its values, sorted by name, like a `dict`.
@@ -104,7 +104,7 @@ class MetricValues(dict):
         """The values with units, ready for JSON; numbers that are not finite are None."""
         return {name: with_unit(value, self.units.get(name, "")) for name, value in self.items()}
 
-    def __missing__(self, name: Any) -> Any:
+    def __missing__(self, name: str) -> Any:
         new = current_name(name, self.keys())
         if new != name:
             return self[new]
@@ -116,11 +116,13 @@ class MetricValues(dict):
     def __contains__(self, name: object) -> bool:
         return super().__contains__(name) or _new_name(name, self.keys()) is not None
 
-    def get(self, name: object, default: object = None) -> Any:
+    def get(self, name: str, default: object = None) -> Any:
         """The value of a metric, or the default if there is no metric of this name."""
         return self[name] if name in self else default
 
-    def tree_flatten_with_keys(self) -> tuple[list[tuple[Any, Any]], tuple[tuple[str, str | None], ...]]:
+    def tree_flatten_with_keys(
+        self,
+    ) -> tuple[list[tuple[object, object]], tuple[tuple[str, str | None], ...]]:
         """Values with their names, and the names with their units."""
         names = sorted(self)
         return [(jax.tree_util.DictKey(name), self[name]) for name in names], tuple(

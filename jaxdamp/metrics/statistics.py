@@ -8,7 +8,7 @@ import dataclasses
 import enum
 import functools
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeAlias, final
+from typing import NamedTuple, SupportsIndex, TypeAlias, final
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
@@ -130,7 +130,7 @@ class Statistic:
     def __repr__(self) -> str:
         return self.name
 
-    def __reduce_ex__(self, protocol: Any) -> str | tuple[Any, ...]:
+    def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[object, ...]:
         """Those of this module are pickled by name: the copy is the same statistic, and compiles nothing anew."""
         return (_named, (self.name,)) if STATISTICS.get(self.name) is self else super().__reduce_ex__(protocol)
 

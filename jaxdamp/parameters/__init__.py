@@ -9,6 +9,7 @@ parameter inside a composition. Freezing, ties and extra bounds are arguments of
 
 from jaxdamp.parameters._coordinates import Bounds as Bounds, Coordinates as Coordinates
 from jaxdamp.parameters._declaration import (
+    DomainOf as DomainOf,
     Module as Module,
     Parameter as Parameter,
     as_float as as_float,

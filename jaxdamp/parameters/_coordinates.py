@@ -1,6 +1,7 @@
 """The coordinates in which searches move parameters: numbers of order one, with bounds and order constraints."""
 
-from typing import Any, Literal, NamedTuple, TypeVar
+from types import ModuleType
+from typing import Literal, NamedTuple, TypeVar
 
 import equinox as eqx
 import jax
@@ -178,7 +179,7 @@ def _magnitude(value: PyTree) -> PyTree:
     Numbers that JAX does not trace are computed by NumPy, because JAX would compile each operation separately.
     """
     traced = isinstance(value, Tracer)
-    xp: Any = jnp if traced else np
+    xp: ModuleType = jnp if traced else np
     magnitude = xp.abs(jax.lax.stop_gradient(value) if traced else np.asarray(value))
     largest = xp.max(magnitude, initial=0.0)
     floor = xp.maximum(1e-3 * largest, jnp.finfo(value.dtype).tiny)
@@ -197,7 +198,7 @@ def _scale(p: Parameter) -> Array | np.ndarray:
 
 
 def _joined(pieces: list[PyTree]) -> PyTree:
-    xp: Any = np if all(isinstance(piece, np.ndarray | np.generic) for piece in pieces) else jnp
+    xp: ModuleType = np if all(isinstance(piece, np.ndarray | np.generic) for piece in pieces) else jnp
     return xp.concatenate([xp.ravel(piece) for piece in pieces])
 
 

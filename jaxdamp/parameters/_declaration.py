@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Array
+from jaxtyping import Array, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._forked import refuse_fork
@@ -48,7 +48,8 @@ def as_float(value: object, name: str = "value") -> Array:
         raise
 
 
-DomainOf: TypeAlias = Domain | Callable[[Any], Domain]
+Declared: TypeAlias = Mapping[str, Any]  # of a field: unit, meaning, domain and the others
+DomainOf: TypeAlias = Domain | Callable[[PyTree], Domain]
 
 
 def parameter(
@@ -58,7 +59,7 @@ def parameter(
     *,
     linear: bool = False,
     adjustable: bool = True,
-    **field: Any,
+    **field: object,
 ) -> Any:
     """Declare a field of an equinox module as a parameter.
 
@@ -75,7 +76,7 @@ def parameter(
     return _number("parameter", declared, field)
 
 
-def setting(unit: str, meaning: str, domain: DomainOf = real, *, command: bool = False, **field: Any) -> Any:
+def setting(unit: str, meaning: str, domain: DomainOf = real, *, command: bool = False, **field: object) -> Any:
     """Declare a field as a number with a unit that fits and tunings never change, such as a knee width.
 
     A `command` is set from outside, run by run, such as a coil current (`dampers.with_command`). Sweeps and tunings
@@ -91,7 +92,7 @@ def setting(unit: str, meaning: str, domain: DomainOf = real, *, command: bool =
     return _number("setting", {"unit": unit, "meaning": meaning, "domain": domain, "command": command}, field)
 
 
-def _number(kind: str, declared: dict[str, Any], options: dict[str, Any]) -> Any:
+def _number(kind: str, declared: Declared, options: Declared) -> Any:
     """A field that converts numbers to arrays, with an error that names the field."""
 
     def convert(value: object) -> Array:
@@ -129,7 +130,7 @@ class Parameter(eqx.Module):
     """
 
     path: str = eqx.field(static=True)
-    value: Any
+    value: PyTree
     unit: str = eqx.field(static=True)
     meaning: str = eqx.field(static=True)
     domain: Domain = eqx.field(static=True)
@@ -138,7 +139,7 @@ class Parameter(eqx.Module):
     command: bool = eqx.field(static=True, default=False)
 
 
-def _children(tree: object) -> Iterable[tuple[object, Any]]:
+def _children(tree: object) -> Iterable[tuple[object, object]]:
     """What a container or a module holds, with index, key or name of the field."""
     if isinstance(tree, tuple | list):
         return enumerate(tree)
@@ -160,7 +161,7 @@ def modules_inside(tree: object, prefix: str = "") -> Iterator[tuple[str, eqx.Mo
         yield from modules_inside(child, f"{prefix}{name}.")
 
 
-def declared_inside(tree: object, prefix: str = "") -> Iterator[tuple[str, eqx.Module, Mapping[str, Any]]]:
+def declared_inside(tree: object, prefix: str = "") -> Iterator[tuple[str, eqx.Module, Declared]]:
     """The declared fields of all modules in a tree, depth first: path, module and metadata of the field.
 
     Arguments:
@@ -176,7 +177,7 @@ def declared_inside(tree: object, prefix: str = "") -> Iterator[tuple[str, eqx.M
             yield from declared_inside(child, f"{prefix}{name}.")
 
 
-def domain_of(declared: dict[str, Any], module: eqx.Module) -> Domain:
+def domain_of(declared: Declared, module: eqx.Module) -> Domain:
     """The domain of a declared field; one that depends on a setting is a function of the module.
 
     Arguments:

@@ -4,7 +4,7 @@ import dataclasses
 import functools
 from collections.abc import Callable
 from types import ModuleType
-from typing import Any, TypeAlias
+from typing import SupportsIndex, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -44,7 +44,7 @@ class Domain:
     slopes: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
     remade: tuple[Callable[..., "Domain"], tuple[float, ...]] | None = dataclasses.field(default=None, repr=False)
 
-    def __reduce_ex__(self, protocol: Any) -> str | tuple[Any, ...]:
+    def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[object, ...]:
         """Pickled by name or by ends: its copy is the domain itself, so that nothing is compiled anew for it."""
         own = next((name for name, value in globals().items() if value is self), None)
         return own or self.remade or super().__reduce_ex__(protocol)

@@ -3,7 +3,6 @@
 import dataclasses
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -241,7 +240,7 @@ def _known(tree: object, names: Sequence[str], tie: object) -> list[Parameter]:
 
 
 def _limits_by_path(
-    known: Sequence[str], free: set[str], leaders: Mapping[str, str], bounds: Mapping[str, Any]
+    known: Sequence[str], free: set[str], leaders: Mapping[str, str], bounds: Mapping[str, tuple[float, float]]
 ) -> dict[str, tuple[float, float]]:
     """Extra limits by path, checked. If two names match a parameter, the later one counts."""
     if not isinstance(bounds, Mapping):

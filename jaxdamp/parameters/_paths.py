@@ -5,10 +5,11 @@ import itertools
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import equinox as eqx
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_field_types
@@ -79,7 +80,7 @@ def checked(tree: Tree) -> Tree:
     return tree
 
 
-def get(tree: object, path: str) -> Any:
+def get(tree: object, path: str) -> PyTree:
     """The value at a path such as `"damper.terms.0.rate"`.
 
     Arguments:

@@ -3,7 +3,7 @@
 import math
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -40,7 +40,7 @@ class Columns(NamedTuple):
 if TYPE_CHECKING:
     from typing import TypeVar
 
-    _Method = TypeVar("_Method", bound=Callable[..., Any])
+    _Method = TypeVar("_Method", bound=Callable[..., object])
 
     def _for_jit(method: _Method) -> _Method: ...
 else:
@@ -48,10 +48,10 @@ else:
     class _for_jit:
         """A method that can be passed on as a function: to `jax.jit`, which refuses the methods of equinox."""
 
-        def __init__(self, method: Callable[..., Any]) -> None:
+        def __init__(self, method: Callable[..., object]) -> None:
             self.method = method
 
-        def __get__(self, road: object, owner: type | None = None) -> Callable[..., Any]:
+        def __get__(self, road: object, owner: type | None = None) -> Callable[..., object]:
             return self.method if road is None else Partial(self.method, road)
 
 

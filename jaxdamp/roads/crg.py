@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +10,10 @@ from jaxdamp import _checks
 from jaxdamp._types import ScalarLike, VectorLike
 from jaxdamp.roads._sampled import SampledRoad
 from jaxdamp.roads.profile import from_profile
+
+
+if TYPE_CHECKING:
+    import pyopencrg
 
 
 # Modifiers of a file that change heights along a line, by the names pyopencrg has for them.
@@ -86,7 +90,7 @@ def read_crg(
     return from_profile(u[first : last + 1], heights, speed, periodic=periodic, ramp=ramp)
 
 
-def lines(surface: Any, lateral: np.ndarray) -> np.ndarray:
+def lines(surface: "pyopencrg.CrgRoad", lateral: np.ndarray) -> np.ndarray:
     """The heights [m] along the lines at the positions `lateral` [m] of a surface of pyopencrg, NaN in gaps."""
     v, z = np.asarray(surface.v), np.asarray(surface.z, float)
     left = np.clip(np.searchsorted(v, lateral, side="right") - 1, 0, v.size - 2)
@@ -97,7 +101,7 @@ def lines(surface: Any, lateral: np.ndarray) -> np.ndarray:
     return low + high + np.asarray(surface.zr)[:, None] + np.asarray(surface.banking)[:, None] * lateral
 
 
-def _surface(path: Path) -> Any:
+def _surface(path: Path) -> "pyopencrg.CrgRoad":
     if not path.is_file():
         raise FileNotFoundError(f"There is no file {path}.")
     try:
@@ -128,7 +132,7 @@ def _range(u: np.ndarray, start: float | int | None, stop: float | int | None) -
     return ends[0], ends[1]
 
 
-def _measured(surface: Any, first: int, last: int) -> str:
+def _measured(surface: "pyopencrg.CrgRoad", first: int, last: int) -> str:
     """The lateral range of the grid lines without a gap between two points along the road, in words."""
     whole = ~np.isnan(np.asarray(surface.z)[first : last + 1]).any(axis=0)
     v = np.asarray(surface.v)[whole]

@@ -1,7 +1,7 @@
 """Random roads of the ISO 8608 roughness classes."""
 
 import math
-from typing import Any, final
+from typing import final
 
 import equinox as eqx
 import jax
@@ -101,10 +101,11 @@ def _from_grid(cycles: Signal, real: Lines, imaginary: Lines, first: int) -> Sig
 
 
 _interpolated = jax.custom_jvp(_from_grid, nondiff_argnums=(3,))
+Inputs = tuple[Signal, Lines, Lines]
 
 
 @_interpolated.defjvp
-def _derivative(first: int, primals: Any, tangents: Any) -> tuple[Signal, Signal]:
+def _derivative(first: int, primals: Inputs, tangents: Inputs) -> tuple[Signal, Signal]:
     """The slope is the sum of the lines times 2 pi i n, as exact as the value; that of the window is not."""
     (cycles, real, imaginary), (faster, more_real, more_imaginary) = primals, tangents
     turning = 2.0 * jnp.pi * jnp.arange(first, first + real.size, dtype=real.dtype)

@@ -3,7 +3,6 @@
 import csv
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -105,7 +104,7 @@ def _uniform_spacing(position: np.ndarray) -> float:
     return spacing
 
 
-def _refuse_gaps(argument: str, values: Any) -> None:
+def _refuse_gaps(argument: str, values: np.ndarray | None) -> None:
     if values is not None and not np.all(np.isfinite(values)):
         bad = ~np.isfinite(values).reshape(values.shape[0], -1).all(axis=1)
         _checks.refuse(

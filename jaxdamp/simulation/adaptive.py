@@ -1,6 +1,6 @@
 """The adaptive engine: the same equations handed to diffrax, as reference and for stiff laws."""
 
-from typing import Any, final
+from typing import TYPE_CHECKING, final
 
 import equinox as eqx
 import jax
@@ -15,6 +15,10 @@ from jaxdamp.rig import solve_law
 from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver, Outcome, RunState
 from jaxdamp.simulation.equations import STRAIGHT, Equations, RoadEdges, RoadInput, StepState, road_rate
 from jaxdamp.vehicles import States
+
+
+if TYPE_CHECKING:
+    import diffrax
 
 
 STEPS_PER_INSTANT = 100  # on average: more are a law too fast for the solver, and would take for ever
@@ -39,7 +43,7 @@ class Adaptive(AbstractEngine):
     Response of a QuarterCar over 0.5 s, 501 instants, 12 channels
     """
 
-    solver: Any = None
+    solver: "diffrax.AbstractSolver | None" = None
     rtol: float = eqx.field(static=True, default=1e-8)
     atol: float = eqx.field(static=True, default=1e-10)
     mode: Mode = eqx.field(static=True, default="forward")
@@ -50,7 +54,7 @@ class Adaptive(AbstractEngine):
         check_solver(self._solver(), self.rtol, self.atol)
         _checks.one_of("mode", self.mode, ["forward", "reverse"])
 
-    def _solver(self) -> Any:
+    def _solver(self) -> "diffrax.AbstractSolver":
         import diffrax
 
         return diffrax.Tsit5() if self.solver is None else self.solver

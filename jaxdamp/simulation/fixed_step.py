@@ -7,7 +7,7 @@ small arrays and carries no more than it must.
 
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import Any, TypeAlias, final
+from typing import TypeAlias, final
 
 import equinox as eqx
 import jax
@@ -98,7 +98,9 @@ class AbstractFixedStep(AbstractEngine):
     def _outcome(self, carry: Carry, records: PyTree, equations: Equations) -> Outcome:
         return Outcome(carry[1], records, equations.ports.by_port(carry[0].states), last=carry[0])
 
-    def _printed(self, step: Any, carry: Carry, rows: Row, observer: AbstractObserver) -> Carry:
+    def _printed(
+        self, step: Callable[[PyTree, PyTree], PyTree], carry: Carry, rows: Row, observer: AbstractObserver
+    ) -> Carry:
         """The carry at the end of a loop that is printed; refused where something of each instant is saved."""
         try:
             if jax.tree.leaves(observer.saved(carry[0], carry[1])):

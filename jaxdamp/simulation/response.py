@@ -4,7 +4,7 @@ import dataclasses
 import os
 from collections.abc import Callable, Hashable, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, final
+from typing import TypeVar, final
 
 import equinox as eqx
 import jax
@@ -280,7 +280,7 @@ class Response(eqx.Module, AbstractResult):
             "energy_balance": {name: with_unit(value, "J") for name, value in self.energy_balance().items()},
         }
 
-    def plot(self, kind: str = "ride", **options: Any) -> Figure:
+    def plot(self, kind: str = "ride", **options: object) -> Figure:
         """Channels over time and the spectrum of the first, or the sheet of the ride.
 
         Arguments:

@@ -4,7 +4,7 @@ import copy
 import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
-from typing import Any, final
+from typing import final
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -17,7 +17,7 @@ from jaxdamp._forked import refuse_fork
 from jaxdamp._jacobian import Mode
 from jaxdamp._many_points import outside_domains
 from jaxdamp._traced import is_batched, look_behind
-from jaxdamp._types import Scalar
+from jaxdamp._types import Point, Scalar
 from jaxdamp._vectors import MemoryLayout
 from jaxdamp.codegen import compiler
 from jaxdamp.configuration import one_at_a_time, target
@@ -193,7 +193,7 @@ class Ride(eqx.Module):
             return None
         return eqx.tree_at(lambda ride: ride.engine, self, engine).side_by_side()
 
-    def range_use(self, point: Mapping[str, object] | None = None) -> dict[str, list[RangeUse]]:
+    def range_use(self, point: Point | None = None) -> dict[str, list[RangeUse]]:
         """What each damper does at a point beside the range that its law was fitted to; only of laws that have one.
 
         It drives the run once more and keeps it: ask it of the few points that matter, not of a whole sweep. On a white
@@ -212,7 +212,7 @@ class Ride(eqx.Module):
         saved, _ = recorded(self.engine, system, heights, step)
         return range_uses(vehicle, system.form, saved.motion, saved.road, saved.road_rate, saved.port_force)
 
-    def equivalent_dampers(self, point: Mapping[str, object] | None = None) -> dict[str, EquivalentDamper]:
+    def equivalent_dampers(self, point: Point | None = None) -> dict[str, EquivalentDamper]:
         """On a white road, the linear damper that stands for each law at a point; empty on other roads.
 
         `EquivalentDamper.words` says it as in "Gaussian, equivalent slope 2006 N s/m at 0.21 m/s RMS".
@@ -225,7 +225,7 @@ class Ride(eqx.Module):
         """Why the vehicle cannot have the values of each of many points: a text, empty where it can."""
         return outside_domains(self.vehicle, columns)
 
-    def __call__(self, point: Mapping[str, Any] | None = None) -> dict[str, Scalar]:
+    def __call__(self, point: Point | None = None) -> dict[str, Scalar]:
         """The metrics by name, with other values of the parameters at these paths."""
         refuse_fork()
         point = dict(point or {})
@@ -255,7 +255,7 @@ class Ride(eqx.Module):
 
 
 @eqx.filter_jit
-def _drive(ride: Ride, point: dict[str, Any]) -> dict[str, Scalar]:
+def _drive(ride: Ride, point: dict[str, Array]) -> dict[str, Scalar]:
     """The metrics of the vehicle at a point."""
     vehicle = replace(ride.vehicle, point)
     if isinstance(ride.road, WhiteRoad):

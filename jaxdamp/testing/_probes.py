@@ -4,7 +4,6 @@ Laws of equal structure are thus compiled once; points and motions are in groups
 """
 
 from collections.abc import Callable
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -34,7 +33,7 @@ def require_equal(found: object, expected: object, message: str, *, rtol: float 
 
 
 def require_refusal(
-    call: Callable[[], Any], words: tuple[str, ...], kinds: tuple[type[Exception], ...], message: str
+    call: Callable[[], object], words: tuple[str, ...], kinds: tuple[type[Exception], ...], message: str
 ) -> None:
     """Raise an `AssertionError` with the message unless a call raises one of these errors and names what is wrong."""
     try:

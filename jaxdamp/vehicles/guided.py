@@ -1,11 +1,11 @@
 """Vehicles on a test rig: with guides and springs to the ground, or driven by forces on the wheels."""
 
 import dataclasses
-from typing import Any, final
+from typing import final
 
 import equinox as eqx
 
-from jaxdamp._types import Number
+from jaxdamp._types import Number, ScalarLike
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import nonnegative, parameter
 from jaxdamp.vehicles.base import AbstractVehicle
@@ -58,7 +58,7 @@ class Guide(AbstractPart):
 
     law: AbstractDamper | None = None
     body: str = eqx.field(static=True, default=SPRUNG)
-    ahead: Any = None
+    ahead: ScalarLike | int | None = None
     stiffness: Number = parameter("N/m", "stiffness of the spring to the ground", nonnegative, default=0.0)
     damping: Number = parameter("N s/m", "coefficient of the dashpot to the ground", nonnegative, default=0.0)
 

@@ -1,12 +1,12 @@
 """The parts of a vehicle: rigid bodies, links between their points, wheels on the road."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeAlias, final
+from typing import TypeAlias, final
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar, ScalarLike
@@ -33,7 +33,7 @@ class Point(eqx.Module):
     {'roll': 1.0, 'z_left': -0.5, 'z_right': 0.5}
     """
 
-    terms: dict[str, Any]
+    terms: Mapping[str, ScalarLike | int]
 
     def __add__(self, other: "Point") -> "Point":
         terms = dict(self.terms)
@@ -52,7 +52,7 @@ class Point(eqx.Module):
     def __sub__(self, other: "Point") -> "Point":
         return self + -other
 
-    def of(self, values: Mapping[str, object]) -> Any:
+    def of(self, values: Mapping[str, ArrayLike]) -> PyTree:
         """Its value for given values of the coordinates by name, such as a mode shape.
 
         >>> Point({"z_sprung": 1.0, "pitch": -1.0}).of({"z_sprung": 0.5, "pitch": 0.25})
@@ -63,7 +63,7 @@ class Point(eqx.Module):
 
 def matrix(points: Sequence[Point], coordinates: Sequence[str]) -> Float[Array, "points coordinates"]:
     """The coefficients of points, one row each, in the order of the coordinates; other coordinates are ignored."""
-    numbers: list[Any] = [0.0, 1.0]  # each entry is one of these: a gather compiles faster than a stack of rows
+    numbers: list[ScalarLike | int] = [0.0, 1.0]  # of the entries: a gather compiles faster than a stack of rows
     entries = np.zeros((len(points), len(coordinates)), dtype=int)
     column = {name: j for j, name in enumerate(coordinates)}
     for i, point in enumerate(points):
@@ -88,7 +88,8 @@ def prefixed(name: str, word: str) -> str:
     return f"{name}_{word}" if name else word
 
 
-def _maybe(value: object) -> Any:
+def maybe_float(value: ScalarLike | int | None) -> Scalar | None:
+    """The number, as a field holds it, or None."""
     return None if value is None else as_float(value)
 
 
@@ -282,6 +283,6 @@ class Place(AbstractPart):
     """
 
     name: str = eqx.field(static=True)
-    ahead: Any = eqx.field(default=None, converter=_maybe)
-    left: Any = eqx.field(default=None, converter=_maybe)
+    ahead: Scalar | None = eqx.field(default=None, converter=maybe_float)
+    left: Scalar | None = eqx.field(default=None, converter=maybe_float)
     body: str = eqx.field(static=True, default=SPRUNG)

@@ -8,7 +8,7 @@ port is a row R of the geometry; its force acts through the same row, −Rᵀ F,
 """
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, final
+from typing import TYPE_CHECKING, TypeAlias, TypeVar, final
 
 import equinox as eqx
 import jax
@@ -24,7 +24,7 @@ from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
 
 # One array, or a tuple of scalars, as `MemoryLayout` says.
 if TYPE_CHECKING:
-    AtPorts: TypeAlias = Any
+    AtPorts: TypeAlias = PyTree
 else:
     AtPorts = Float[Array, " ports"] | tuple[Scalar, ...]
 Kind = TypeVar("Kind", Array, np.ndarray)

@@ -10,7 +10,7 @@ Applied Mechanics 47 (1980).
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -230,7 +230,9 @@ def _nearest(kinds: Sequence[_Kind], spreads: Sequence[Spread], owners: tuple[in
     constant, slopes = jnp.zeros(answers), jnp.zeros((answers, answers + len(owners)))
     for kind, spread in zip(kinds, spreads, strict=True):
 
-        def of_one(law: AbstractDamper, spread: Spread, scale: Array, curved: Any = kind.curved) -> tuple[Array, Array]:
+        def of_one(
+            law: AbstractDamper, spread: Spread, scale: Array, curved: tuple[int, ...] = kind.curved
+        ) -> tuple[Array, Array]:
             return _nearest_of_one(law, curved, spread, scale)
 
         own, own_slopes = _each(of_one, kind.law, len(kind.answers), spread, kind.scale)

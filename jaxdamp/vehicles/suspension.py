@@ -1,15 +1,15 @@
 """A suspension between two points of a vehicle, and a seat on one: a spring, a damper and optional further laws."""
 
 from collections.abc import Sequence
-from typing import Any, final
+from typing import final
 
 import equinox as eqx
 
 from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers import AbstractDamper, AbstractStateless, Traits
-from jaxdamp.parameters import Module, as_float, nonnegative, parameter, positive
-from jaxdamp.vehicles.parts import AbstractPart, Body, Element, Link, Point
+from jaxdamp.parameters import Module, nonnegative, parameter, positive
+from jaxdamp.vehicles.parts import AbstractPart, Body, Element, Link, Point, maybe_float
 
 
 @final
@@ -119,8 +119,8 @@ class Seat(Module):
     """
 
     masses: tuple[SeatMass, ...]
-    ahead: Any = eqx.field(default=None, converter=lambda v: None if v is None else as_float(v))
-    left: Any = eqx.field(default=None, converter=lambda v: None if v is None else as_float(v))
+    ahead: Scalar | None = eqx.field(default=None, converter=maybe_float)
+    left: Scalar | None = eqx.field(default=None, converter=maybe_float)
     name: str = eqx.field(static=True, default="seat")
 
     def __check_init__(self) -> None:

@@ -97,7 +97,7 @@ def test_refusals(options, message):
 
 def test_engines_refuse_what_they_cannot_be():
     with pytest.raises(ValueError, match=r"`solver` must be a solver of diffrax.*Kvaerno5"):
-        Adaptive("Tsit5")
+        Adaptive("Tsit5")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="`substeps` must be a whole number, 1 or more, but is 0"):
         Exponential(substeps=0)
     with pytest.raises(ValueError, match="`engine` must be given without `method`"):
