@@ -3,10 +3,10 @@
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from jaxdamp import _checks
 from jaxdamp._documents import read_toml
+from jaxdamp._tables import Contents
 
 
 NAME = "jaxdamp.toml"
@@ -57,7 +57,7 @@ def find_manifest(manifest: str | os.PathLike[str] | bool, paths: Sequence[str |
     raise FileNotFoundError(f"There is no manifest {os.fspath(manifest)!r}{places}.")
 
 
-def read_manifest(file: Path, keys: Kinds) -> dict[str, Any]:
+def read_manifest(file: Path, keys: Kinds) -> Contents:
     """The arguments that a manifest holds.
 
     Arguments:
@@ -83,7 +83,7 @@ def read_manifest(file: Path, keys: Kinds) -> dict[str, Any]:
     return stated
 
 
-def merged(manifest: Mapping[str, Any], arguments: Mapping[str, Any]) -> dict[str, Any]:
+def merged(manifest: Contents, arguments: Contents) -> Contents:
     """The manifest with what was given in the call, which wins; columns, units and gains quantity by quantity."""
     out = {key: value for key, value in manifest.items() if key not in ("files", "test", "show")}
     for key, value in arguments.items():

@@ -5,7 +5,7 @@ raw record in the order of the fields of `Steps`: so it does not matter in which
 """
 
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from typing import TYPE_CHECKING, NamedTuple, final
 
 import numpy as np
 from jaxtyping import Float
@@ -70,7 +70,7 @@ class Steps:
         if more.between is not None and (self.skip_cycles, self.last_cycles) != (None, None):
             remedy = "Cut in time first, or begin with `run.raw`: cycles are counted in the part that is kept."
             _checks.refuse("between", "be given before cycles are chosen", more.between, remedy)
-        merged: dict[str, Any] = {}
+        merged: dict[str, object] = {}
         for field in fields(self):
             old, new = getattr(self, field.name), getattr(more, field.name)
             if old in (None, False) or new in (None, False):
@@ -86,7 +86,7 @@ class Steps:
             else:
                 remedy = "Begin with `run.raw`."
                 _checks.refuse(field.name, "be given once", f"{new} after {old}", remedy)
-        return Steps(**merged)
+        return replace(self, **merged)
 
 
 class Origin(NamedTuple):
@@ -131,7 +131,7 @@ def low_pass_gain(frequency: float, cutoff: float, sampling_rate: float) -> floa
     return float(1.0 / (1.0 + warped ** (2 * ORDER)))
 
 
-def _noted(run: "BenchRun", note: str, **changes: Any) -> "BenchRun":
+def _noted(run: "BenchRun", note: str, **changes: object) -> "BenchRun":
     return replace(run, **changes, notes=(*run.notes, note))
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
@@ -27,7 +27,7 @@ class RawColumn:
     """
 
     name: str
-    values: np.ndarray | Sequence[Any]
+    values: np.ndarray | Sequence[object]
     unit: str = ""
     faults: Mapping[int, str] = field(default_factory=dict)
 
@@ -78,13 +78,13 @@ class RawTable:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "columns", tuple(self.columns))
-        lengths = {column.name: np.size(column.values) for column in self.columns}
+        lengths = {column.name: len(column.values) for column in self.columns}
         if len(set(lengths.values())) > 1:
             _checks.refuse("columns", "have the same number of samples", str(lengths))
 
     def __len__(self) -> int:
         """Number of samples."""
-        return np.size(self.columns[0].values) if self.columns else 0
+        return len(self.columns[0].values) if self.columns else 0
 
     @property
     def where(self) -> str:

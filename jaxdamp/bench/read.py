@@ -5,11 +5,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from jaxdamp import _checks
 from jaxdamp._checks import Setting
 from jaxdamp._files import FOLDER_SUFFIXES, find_files
+from jaxdamp._tables import Contents
 from jaxdamp.bench import sign as signs
 from jaxdamp.bench.bench_tables import Interpretation, bench_runs
 from jaxdamp.bench.clock import on_one_clock
@@ -106,7 +107,7 @@ def read(
     force and stroke of the file agree in sign (work per cycle +31.41 J)
     """
     asked: list[str | os.PathLike[str]] = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
-    given: dict[str, Any] = {
+    given: Contents = {
         "sign": sign,
         "force_sign": force_sign,
         "columns": columns,
@@ -190,7 +191,7 @@ def read_rides(
     ('m/s^2', 0.980665)
     """
     asked: list[str | os.PathLike[str]] = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
-    given: dict[str, Any] = {
+    given: Contents = {
         "columns": columns,
         "road": road,
         "units": units,
@@ -215,7 +216,7 @@ def read_rides(
     return tuple(records)
 
 
-def _files_of(asked: list[str | os.PathLike[str]], manifest: Mapping[str, Any]) -> list[str | os.PathLike[str]]:
+def _files_of(asked: list[str | os.PathLike[str]], manifest: Contents) -> list[str | os.PathLike[str]]:
     """What is read: the files that the manifest names, if a folder is asked for."""
     if "files" not in manifest or len(asked) > 1 or not Path(asked[0]).expanduser().is_dir():
         return asked

@@ -1,11 +1,12 @@
 """Readers of files by suffix: text, workbooks, MATLAB, TDMS, MDF4, Parquet. The libraries are the extra `io`."""
 
+import datetime
 import importlib
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType, ModuleType
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -81,13 +82,16 @@ def _filled_rows(cells: list[tuple]) -> list[tuple[int, list[str]]]:
     return [(n, row) for n, row in rows if any(row)]
 
 
-def _written(cell: Any) -> str:
+Structure: TypeAlias = dict[str, Any]  # of a MATLAB file: arrays, numbers, texts, lists and structures
+
+
+def _written(cell: object) -> str:
     """A cell as text that gives back the same number."""
     if cell is None:
         return ""
     if isinstance(cell, bool | int | float):
         return repr(float(cell))
-    return cell.isoformat() if hasattr(cell, "isoformat") else str(cell).strip()
+    return cell.isoformat() if isinstance(cell, datetime.date | datetime.time) else str(cell).strip()
 
 
 def read_mat(file: Path) -> list[RawTable]:
@@ -96,7 +100,7 @@ def read_mat(file: Path) -> list[RawTable]:
     return _alone(list(_structures(file, "", {k: v for k, v in content.items() if not k.startswith("__")})))
 
 
-def _structures(file: Path, name: str, fields: dict[str, Any]) -> Iterator[RawTable]:
+def _structures(file: Path, name: str, fields: Structure) -> Iterator[RawTable]:
     """The record of a structure, and those of the structures inside it."""
     units = next((fields[key] for key in ("units", "unit") if isinstance(fields.get(key), dict)), {})
     columns, inside = [], {}
@@ -117,7 +121,7 @@ def _structures(file: Path, name: str, fields: dict[str, Any]) -> Iterator[RawTa
             yield from _structures(file, f"{name}.{place}".lstrip("."), element)
 
 
-def _elements(value: dict[str, Any]) -> list[dict[str, Any]]:
+def _elements(value: Structure) -> list[Structure]:
     """The elements of an array of structures, which is read as a structure of lists."""
     lists = [item for item in value.values() if isinstance(item, list)]
     if not lists or len(lists) < len(value) or len(set(map(len, lists))) > 1:
@@ -125,14 +129,14 @@ def _elements(value: dict[str, Any]) -> list[dict[str, Any]]:
     return [{key: item[index] for key, item in value.items()} for index in range(len(lists[0]))]
 
 
-def _channel(name: str, fields: dict[str, Any]) -> list[RawColumn]:
+def _channel(name: str, fields: Structure) -> list[RawColumn]:
     """A structure that is one channel: its samples and the text of its unit."""
     unit = next((fields[key] for key in ("unit", "units", "Unit", "Units") if isinstance(fields.get(key), str)), None)
     vectors = [column for key, value in fields.items() for column in _vectors(key, value, unit or "")]
     return [RawColumn(name, vectors[0].values, unit)] if unit is not None and len(vectors) == 1 else []
 
 
-def _vectors(name: str, value: Any, unit: str) -> list[RawColumn]:
+def _vectors(name: str, value: object, unit: str) -> list[RawColumn]:
     """The columns of a variable: itself, or those of a matrix of channels side by side."""
     if isinstance(value, list) and len(value) > 1 and all(isinstance(item, str) for item in value):
         return [RawColumn(name, value, unit)]
@@ -197,7 +201,7 @@ def read_parquet(file: Path) -> list[RawTable]:
 
 def _of_one_length(file: Path, name: str, columns: list[RawColumn]) -> RawTable | None:
     """The columns of the length that most of them have, and a note on the rest; None if they are not two."""
-    lengths = [np.size(column.values) for column in columns]
+    lengths = [len(column.values) for column in columns]
     length = max(lengths, key=lambda n: (lengths.count(n), n), default=0)
     same = [column for column, n in zip(columns, lengths, strict=True) if n == length]
     others = [f"{column.name} ({n})" for column, n in zip(columns, lengths, strict=True) if n != length]

@@ -5,12 +5,13 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, final
+from typing import final
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp._tables import Contents
 from jaxdamp.bench import clock
 
 
@@ -135,7 +136,7 @@ class RideRecord:
         path.write_text("\n".join([RIDE_MARK, *settings, ",".join(header), *rows]) + "\n", encoding="utf-8")
         return path
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> Contents:
         """Length, rate and the standard deviation of each channel, in SI."""
         levels = {f"standard deviation of {name}": float(np.std(values)) for name, values in self.channels.items()}
         return {"name": self.name, "samples": len(self), "sampling_rate": 1.0 / self.dt, **levels}

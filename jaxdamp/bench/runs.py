@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks
+from jaxdamp._tables import Contents
 from jaxdamp._types import Figure
 from jaxdamp.bench import clock
 from jaxdamp.bench.headers import COMMAND_HEADER
@@ -280,7 +281,7 @@ class BenchRun:
         """The last full cycles of the record, from one passage of mid-stroke to another."""
         return self._cut(choose_cycles(self, 0, count))
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> Contents:
         """The figures of the record in SI, one row of the set's table."""
         return {
             "name": self.name,

@@ -1,7 +1,7 @@
 """The sensors of a virtual bench: noise and faults of its channels."""
 
 from dataclasses import dataclass, field, fields
-from typing import Any, final
+from typing import TypeVar, final
 
 import numpy as np
 
@@ -9,7 +9,10 @@ from jaxdamp import _checks
 from jaxdamp.bench.motion import Samples
 
 
-def _fault(unit: str, default: float | None = 0.0) -> Any:
+T = TypeVar("T")
+
+
+def _fault(unit: str, default: T) -> T:
     """A field for the size of a fault, with its unit."""
     return field(default=default, metadata={"unit": unit})
 
@@ -45,19 +48,19 @@ class Sensors:
         ValueError: a negative size, rate or resolution; a limit or mains frequency that is not positive.
     """
 
-    force_noise: float | int = _fault("N")
-    stroke_noise: float | int = _fault("m")
-    command_noise: float | int = _fault("")
-    mains_ripple: float | int = _fault("N")
-    stroke_ripple: float | int = _fault("m")
+    force_noise: float | int = _fault("N", 0.0)
+    stroke_noise: float | int = _fault("m", 0.0)
+    command_noise: float | int = _fault("", 0.0)
+    mains_ripple: float | int = _fault("N", 0.0)
+    stroke_ripple: float | int = _fault("m", 0.0)
     mains_frequency: float | int = _fault("Hz", 50.0)
-    spike_rate: float | int = _fault("1/s")
-    spike_size: float | int = _fault("N")
+    spike_rate: float | int = _fault("1/s", 0.0)
+    spike_size: float | int = _fault("N", 0.0)
     force_limit: float | int | None = _fault("N", None)
     stroke_limit: float | int | None = _fault("m", None)
-    force_resolution: float | int = _fault("N")
-    stroke_resolution: float | int = _fault("m")
-    clock_jitter: float | int = _fault("s")
+    force_resolution: float | int = _fault("N", 0.0)
+    stroke_resolution: float | int = _fault("m", 0.0)
+    clock_jitter: float | int = _fault("s", 0.0)
     stamped_jitter: bool = False
     reversed_force: bool = False
     force_stuck_from: float | int | None = _fault("s", None)
@@ -107,7 +110,7 @@ class Sensors:
         return [described(each.name, getattr(self, each.name), each.metadata.get("unit", "")) for each in there]
 
 
-def described(name: str, value: Any, unit: str) -> str:
+def described(name: str, value: float, unit: str) -> str:
     """A setting in words: "force delay 0.003 s"."""
     words = name.replace("_", " ")
     return words if value is True else f"{words} {float(value):g} {unit}".rstrip()

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, final, overload
 
 from jaxdamp import _checks
+from jaxdamp._tables import Contents
 from jaxdamp._types import Figure
 from jaxdamp.bench.runs import BenchRun
 
@@ -123,7 +124,7 @@ class BenchSet:
 
         return plots.records(self)
 
-    def table(self) -> list[dict[str, Any]]:
+    def table(self) -> list[Contents]:
         """One row of figures in SI per record: a list that `pandas.DataFrame` takes as it is."""
         return [run.summary() for run in self.runs]
 
@@ -165,7 +166,7 @@ def _file_name(name: str) -> str:
     return "".join("_" if c in '/\\:*?"<>|' or ord(c) < 32 else c for c in name).strip(" .") or "record"
 
 
-def as_runs(runs: Any, argument: str = "runs", call: str = "") -> tuple[BenchRun, ...]:
+def as_runs(runs: object, argument: str = "runs", call: str = "") -> tuple[BenchRun, ...]:
     """One record or many as a tuple.
 
     Arguments:

@@ -3,7 +3,7 @@
 import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
-from typing import Any, final
+from typing import final
 
 import equinox as eqx
 import jax
@@ -80,7 +80,7 @@ class VirtualDyno:
         sensors: Sensors | None = None,
         temperature_channel: bool = False,
         seed: int = 0,
-        **settings: Any,
+        **settings: object,
     ) -> None:
         check_module("law", law, (AbstractDamper,), "VirtualDyno(law, force_noise=20.0)")
         rig, sensors = rig or Rig(), sensors or Sensors()

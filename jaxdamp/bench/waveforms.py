@@ -15,7 +15,7 @@ from jaxdamp.bench.programmes import growth
 class _Steady:
     """A motion that grows over the first half of its warm-up."""
 
-    warm_up: Any
+    warm_up: Any  # a number: a field or a property
 
     @abstractmethod
     def _motion(self, time: Samples) -> tuple[Samples, Samples]:

@@ -6,7 +6,7 @@ import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from difflib import get_close_matches
-from typing import Any, NamedTuple, Protocol, final, runtime_checkable
+from typing import NamedTuple, Protocol, final, runtime_checkable
 
 import jax
 import jax.numpy as jnp
@@ -58,7 +58,7 @@ class HasDerivatives(Protocol):
 class HasSideBySide(Protocol):
     """A function with a form for many points at a time."""
 
-    def side_by_side(self) -> Callable[[dict[str, Any]], Any]:
+    def side_by_side(self) -> PointFunction:
         """That form, which is compiled in its place."""
         ...
 
@@ -67,7 +67,7 @@ class HasSideBySide(Protocol):
 class HasPrinted(Protocol):
     """A function whose loop can be printed as C, which may be faster."""
 
-    def printed_side_by_side(self) -> Callable[[dict[str, Any]], Any] | None:
+    def printed_side_by_side(self) -> PointFunction | None:
         """That form, for long sweeps without derivatives on processors; None if XLA is to compile it in any case."""
         ...
 
@@ -84,7 +84,7 @@ class HasDomain(Protocol):
 class SweepFunction(HasUnits, HasLanes, HasDerivatives, HasSideBySide, HasPrinted, HasDomain, Protocol):
     """A function that says all of it, as `jaxdamp.Ride` does."""
 
-    def __call__(self, point: Mapping[str, object]) -> Mapping[str, Any]:
+    def __call__(self, point: dict[str, Scalar]) -> Mapping[str, Array]:
         """The results by name at a point."""
         ...
 
@@ -132,7 +132,7 @@ class StaticPart:
         leaves, self._tree = jax.tree.flatten(function)
         self._others = tuple(None if _is_array(leaf) else leaf for leaf in leaves)
         self._places = tuple(i for i, leaf in enumerate(leaves) if _is_array(leaf))
-        self._key: Any = (self._tree, self._places, tuple((type(leaf), leaf) for leaf in self._others))
+        self._key: object = (self._tree, self._places, tuple((type(leaf), leaf) for leaf in self._others))
         try:
             hash(self._key)
         except TypeError:  # what cannot be compared is compiled anew

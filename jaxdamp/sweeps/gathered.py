@@ -8,9 +8,11 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from typing import Any, final
+from typing import final
 
 import numpy as np
+
+from jaxdamp._tables import Contents
 
 
 UNIT = 1200  # sums are in units of 2^-1200, those of squares of 2^-2400; the smallest number is 2^-1074
@@ -215,7 +217,7 @@ class Gathered:
     @classmethod
     def from_text(cls, text: str) -> "Gathered":
         """Out of what `to_text` gives."""
-        read: dict[str, Any] = json.loads(text)
+        read: Contents = json.loads(text)
         read["figures"] = {name: Figures(**figures) for name, figures in read["figures"].items()}
         read["histograms"] = {name: np.array(counts, np.int64) for name, counts in read["histograms"].items()}
         read["chosen"] = {

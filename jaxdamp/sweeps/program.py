@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple, final
+from typing import TYPE_CHECKING, NamedTuple, final
 
 import jax
 import jax.numpy as jnp
@@ -20,7 +20,11 @@ from jaxdamp.sweeps.axes import Columns
 from jaxdamp.sweeps.function import Traced, evaluate, number_type
 
 
-def choose_devices(devices: object) -> list[Any]:
+if TYPE_CHECKING:
+    from jaxlib._jax import Device
+
+
+def choose_devices(devices: object) -> "list[Device]":
     """The devices to use: all of this process, so many, or those given."""
     here = jax.local_devices()
     if devices is None:
@@ -84,7 +88,7 @@ class Program:
     traced: Traced
     layout: Layout
     arrays: list[jax.Array]
-    run: Any
+    run: jax.stages.Compiled
 
     def capacity(self, rounds: int) -> int:
         """Points of a call that runs so many chunks on each device."""
@@ -183,7 +187,7 @@ class _Static:
 
 
 @functools.lru_cache(maxsize=16)
-def _jitted(static: _Static) -> Any:
+def _jitted(static: _Static) -> jax.stages.Wrapped:
     """The program before it is compiled. Kept, because JAX then keeps what it compiles."""
     traced, (mesh, chunk, rounds) = static.traced, static.layout
 
@@ -202,8 +206,7 @@ def _jitted(static: _Static) -> Any:
         return {name: values.reshape(-1, *values.shape[2:]) for name, values in results.items()}
 
     # what a function does inside says nothing about where it runs: its loops may start from the same value everywhere
-    specs: dict[str, Any] = {"in_specs": (ALL, POINTS, ALL), "out_specs": POINTS, "check_vma": False}
-    return jax.jit(jax.shard_map(on_device, mesh=mesh, **specs))
+    return jax.jit(jax.shard_map(on_device, mesh=mesh, in_specs=(ALL, POINTS, ALL), out_specs=POINTS, check_vma=False))
 
 
 def forget_errors(mesh: Mesh) -> None:
@@ -212,9 +215,9 @@ def forget_errors(mesh: Mesh) -> None:
     def unharmed(zero: Array) -> Array:
         return jax.pure_callback(np.asarray, jax.ShapeDtypeStruct(zero.shape, zero.dtype), zero)
 
-    specs: dict[str, Any] = {"in_specs": POINTS, "out_specs": POINTS, "check_vma": False}
+    everywhere = jax.shard_map(unharmed, mesh=mesh, in_specs=POINTS, out_specs=POINTS, check_vma=False)
     zeros = jax.device_put(np.zeros(mesh.size, np.float32), NamedSharding(mesh, POINTS))
-    jax.block_until_ready(jax.jit(jax.shard_map(unharmed, mesh=mesh, **specs))(zeros))
+    jax.block_until_ready(jax.jit(everywhere)(zeros))
 
 
 @contextmanager

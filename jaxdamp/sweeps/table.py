@@ -3,7 +3,7 @@
 import dataclasses
 import warnings
 from collections.abc import Mapping
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
@@ -81,7 +81,7 @@ class Table:
             if name in self.traced.slopes.values():
                 numbered = [PARAMETER]
             variables[name] = ([*dims, *numbered], values.reshape(*lengths, *values.shape[1:]), self.about(name))
-        coordinates: dict[str, Any] = {
+        coordinates: dict[str, object] = {
             name: (along, values, self.about(name)) for name, (along, values) in self.points.coordinates.items()
         }
         coordinates["failed"] = (dims, self.failed.reshape(lengths))

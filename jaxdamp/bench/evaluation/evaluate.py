@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -29,7 +28,7 @@ def evaluate(
     velocities: Sequence[float] | None = None,
     method: str | None = None,
     window: float = WINDOW,
-    by: Callable[[BenchRun], Any] | None = None,
+    by: Callable[[BenchRun], object] | None = None,
 ) -> Evaluation:
     """Evaluate records as dampers are bought and sold, every figure with its scatter over cycles or repeats.
 
@@ -123,7 +122,7 @@ def _notes(runs: Sequence[BenchRun]) -> list[str]:
 
 
 def _by_settings(
-    runs: Sequence[BenchRun], by: Callable[[BenchRun], Any] | None
+    runs: Sequence[BenchRun], by: Callable[[BenchRun], object] | None
 ) -> tuple[dict[str, tuple[BenchRun, ...]], list[str]]:
     """The records of each setting, and a sentence where they are told apart by what they state or by their names."""
     notes: list[str] = []
@@ -141,7 +140,7 @@ def _by_settings(
     return settings, notes
 
 
-def _setting(run: BenchRun, by: Callable[[BenchRun], Any] | None) -> str:
+def _setting(run: BenchRun, by: Callable[[BenchRun], object] | None) -> str:
     if by is not None:
         return str(by(run))
     return "" if run.command is None else f"{run.command:g}"

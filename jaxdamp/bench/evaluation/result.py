@@ -2,13 +2,13 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, plotted
-from jaxdamp._tables import Cell, Column, Compared, Table, comparison_table, percent_change, plain
+from jaxdamp._tables import Cell, Column, Compared, Contents, Table, comparison_table, percent_change, plain
 from jaxdamp._types import Figure
 from jaxdamp.bench.analysis import FoldedCycles
 from jaxdamp.bench.contradictions import repeats
@@ -166,7 +166,7 @@ class Evaluation(AbstractResult):
         """Which measurements lie within limits; see `bench.read_limits`."""
         return LimitCheck.of(self.measurements, limits)
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """All measurements as plain data."""
         return {"method": self.method, "notes": list(self.notes), "measurements": plain(self._list().records())}
 

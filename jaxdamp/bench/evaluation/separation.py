@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, drawn_by
-from jaxdamp._tables import Column, Table
+from jaxdamp._tables import Column, Contents, Table
 from jaxdamp.bench.analysis import FoldedCycles, fold_cycles
 from jaxdamp.bench.evaluation.measurements import Measurement, measured
 from jaxdamp.bench.motion import Samples
@@ -102,7 +102,7 @@ class GasAndFriction(AbstractResult):
         columns = (Column("quantity"), Column("unit"), Column("value"), Column("uncertainty", spec=".2g"))
         return Table(title, (*columns, Column("cycles", spec="d")), rows)
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """The figures as plain data."""
         return {"record": self.record, "note": self.note, **self.table().to_dict()}
 

@@ -2,14 +2,14 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
 from jaxdamp._results import AbstractResult, CallableText
-from jaxdamp._tables import Cell, Column, Table, plain
+from jaxdamp._tables import Cell, Column, Contents, Table, plain
 from jaxdamp.bench.analysis import as_records, peak_velocity_points
 from jaxdamp.bench.contradictions import contradictions
 from jaxdamp.bench.preflight import changes, consistency, motion_checks, sample_checks
@@ -129,7 +129,7 @@ class Preflight(AbstractResult):
         left_out = tuple(names)
         return Preflight(tuple(f for f in self.findings if f.name not in left_out), self.records)
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """All findings as plain data."""
         return {"ok": self.ok, "records": list(self.records), "findings": plain(self.table().records())}
 
