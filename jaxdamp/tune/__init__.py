@@ -17,7 +17,7 @@ from jaxdamp._guesses import answer_old_names
 from jaxdamp._status import Status as Status
 from jaxdamp.tune.decisions import DamperComparison as DamperComparison, compare_dampers
 from jaxdamp.tune.front import ParetoFront as ParetoFront, hypervolume as hypervolume
-from jaxdamp.tune.limits import limit_spans as limit_spans
+from jaxdamp.tune.limits import Limits as Limits, limit_spans as limit_spans
 from jaxdamp.tune.minimising import minimise
 from jaxdamp.tune.objective import Targets, smooth_peak, smooth_settling
 from jaxdamp.tune.pareto_search import pareto

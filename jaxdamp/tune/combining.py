@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, final
+from typing import final
 
 import jax.numpy as jnp
 import numpy as np
@@ -16,6 +16,7 @@ from jaxdamp.tune.limits import Limit
 from jaxdamp.tune.measuring import LANES
 from jaxdamp.tune.ranges import MOST_COMBINATIONS
 from jaxdamp.tune.task import DesignTask, Evaluator
+from jaxdamp.vehicles import AbstractVehicle
 
 
 @final
@@ -89,7 +90,7 @@ def every_combination(evaluator: Evaluator, progress: Callable[[int, float], Non
     return Driven(evaluator, points, len(every) - len(points), progress)
 
 
-def _is_allowed(task: DesignTask[Any], point: Sequence[float]) -> bool:
+def _is_allowed(task: DesignTask[AbstractVehicle], point: Sequence[float]) -> bool:
     """Whether a vehicle can have these numbers."""
     try:
         checked(task.space.free.build(jnp.asarray(point, task.space.free.values.dtype)))
@@ -98,7 +99,7 @@ def _is_allowed(task: DesignTask[Any], point: Sequence[float]) -> bool:
     return True
 
 
-def rank(task: DesignTask[Any], ended: Ended, limits: Sequence[Limit]) -> tuple[float, float]:
+def rank(task: DesignTask[AbstractVehicle], ended: Ended, limits: Sequence[Limit]) -> tuple[float, float]:
     """By how much limits are violated at the end of a search, and the metric there; infinite if it has none."""
     numbers = task.numbers(ended.evaluation.values)
     beyond = [max(-limit.margin(numbers[limit.name]), 0.0) for limit in missed(limits, numbers, task.tolerance)]

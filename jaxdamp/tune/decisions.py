@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol, Unpack, runtime_checkable
+from typing import NamedTuple, Protocol, Unpack, runtime_checkable
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -15,7 +15,7 @@ from jaxdamp._field_types import check_module
 from jaxdamp._jacobian import with_jacobian
 from jaxdamp._progress import Progress
 from jaxdamp._results import AbstractResult, drawn_by
-from jaxdamp._tables import Column, Table, plain, typeset_unit
+from jaxdamp._tables import Column, Contents, Table, plain, typeset_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.metrics import Metric
@@ -23,12 +23,27 @@ from jaxdamp.parameters import FreeParameters, free_parameters
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride
 from jaxdamp.tune.scenario_ride import ScenarioRide
-from jaxdamp.tune.scenarios import Scenarios
+from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import RUN, Run, completed
 from jaxdamp.vehicles import AbstractVehicle
 
 
 NO_EFFECT = 1e-6  # change of a metric per 100 % of a parameter, relative to its size, that counts as none
+
+
+@runtime_checkable
+class FittedNumber(Protocol):
+    """An estimate: its name, and the names of the numbers tied to it."""
+
+    @property
+    def name(self) -> str:
+        """The path of the number."""
+        ...
+
+    @property
+    def tied(self) -> Sequence[str]:
+        """Those of the numbers tied to it."""
+        ...
 
 
 @runtime_checkable
@@ -45,7 +60,7 @@ class FittedLaw(Protocol):
         ...
 
     @property
-    def parameters(self) -> Sequence[Any]:
+    def parameters(self) -> Sequence[FittedNumber]:
         """The estimates."""
         ...
 
@@ -127,7 +142,7 @@ class DamperComparison(AbstractResult):
                 rows.append((metric, typeset_unit(unit, "–"), damper, float(values[metric].mean()), *errors, *more))
         return Table("Ride metrics with standard errors", tuple(columns), tuple(rows))
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """All numbers with units and words, ready for JSON; numbers that are not finite are None."""
         differences = [plain(d) | {"significant": bool(d.significant)} for d in self.differences]
         return self._data("units", "values", "parameter_errors", "road_errors") | {"differences": differences}
@@ -179,7 +194,7 @@ def compare_dampers(
     """
     driven = completed("compare_dampers", run, RUN)
     _check(dampers, vehicle, roads)
-    listed: list[Any] = [roads] if isinstance(roads, WhiteRoad) else list(roads)
+    listed = [roads] if isinstance(roads, WhiteRoad) else list(roads)
     by_damper, warnings, units, first = {}, [], {}, None
     with Progress("Comparing dampers") as shown:
         for number, (name, damper) in enumerate(dampers.items()):
@@ -220,7 +235,7 @@ def _comparison(
     )
 
 
-def _check(dampers: Any, vehicle: Any, roads: Any) -> None:
+def _check(dampers: object, vehicle: object, roads: object) -> None:
     call = "compare_dampers({'A': fit_a, 'B': fit_b}, vehicle, roads)"
     if not isinstance(dampers, Mapping) or len(dampers) < 2:
         _checks.refuse("dampers", "be two or more by name", _checks.described(dampers), f"The call is `{call}`.")
@@ -243,7 +258,7 @@ def _check(dampers: Any, vehicle: Any, roads: Any) -> None:
             _checks.refuse(f"roads[{i}]", "be another road than the others", f"roads[{again}] again", remedy)
 
 
-def _chosen(car: AbstractVehicle, roads: Sequence[Any], metrics: Sequence[str | Metric] | None) -> list[Any]:
+def _chosen(car: AbstractVehicle, roads: Sequence[Road], metrics: Sequence[str | Metric] | None) -> list[str | Metric]:
     """The metrics to compare: those asked for, or all that have a derivative and one sign."""
     if metrics is not None:
         return list(metrics)
@@ -281,7 +296,7 @@ def _metrics_of(
     return _DamperMetrics(values, variance), notes
 
 
-def _effects(estimates: Sequence[Any], names: Sequence[str]) -> Float[np.ndarray, "numbers free"]:
+def _effects(estimates: Sequence[FittedNumber], names: Sequence[str]) -> Float[np.ndarray, "numbers free"]:
     """Change of each number of a law per change of each estimate: one, or a share where the law has a mean."""
     of_wrapper = all(name in names or name.rpartition("[")[0] in names for name in (str(e.name) for e in estimates))
     prefix = "" if of_wrapper else "law."  # of a law on a machine, beside which `Lag(law, ...)` has such paths too

@@ -1,7 +1,7 @@
 """A front: the designs of which none is better in one objective without being worse in another."""
 
 import dataclasses
-from typing import Any, Generic, NamedTuple
+from typing import Generic, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -10,12 +10,13 @@ from jaxtyping import Bool, Float
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._status import Status
-from jaxdamp._tables import Column, Table, plain, typeset_unit, with_unit
+from jaxdamp._tables import Column, Contents, Table, plain, typeset_unit, with_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import MetricValues
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.tune.measuring import Measurement
 from jaxdamp.tune.result import V
+from jaxdamp.vehicles import AbstractVehicle
 
 
 def non_dominated(values: Float[np.ndarray, "points objectives"]) -> Bool[np.ndarray, " points"]:
@@ -138,7 +139,7 @@ class ParetoFront(AbstractResult, Generic[V]):
             _checks.refuse("index", f"be that of a point, 0 to {len(self) - 1}", index)
         return self.free.build(jnp.asarray(self.designs[index], self.free.values.dtype))
 
-    def metrics_of(self, vehicle: Any) -> dict[str, float]:
+    def metrics_of(self, vehicle: AbstractVehicle) -> dict[str, float]:
         """Every metric of another vehicle on the same road, such as a baseline."""
         values = self.measured(vehicle)
         return MetricValues.with_units({name: float(values[name]) for name in self.units}, self.units)
@@ -177,7 +178,7 @@ class ParetoFront(AbstractResult, Generic[V]):
             "Parameters along the front", tuple(columns), (*rows, ("start", *(p.start for p in self.parameters)))
         )
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """The front as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         return self._data("knee", "hypervolume", "fresh", "evaluations", "interpolated", "dropped") | {
             "objectives": list(self.names),

@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from jaxdamp.metrics import Metric, current_name
 EXAMPLE = "Write `{'working_space_peak_to_peak': 0.1}`, or `{...: (smallest, largest)}`."
 ENDS = "Write 0.1, or (-0.08, 0.1); None for an end without a limit, '+10%' for one relative to the start."
 PERCENT = re.compile(r"([+-]\d+(?:\.\d*)?) *%")
+End: TypeAlias = float | int | str | None  # of a limit: in its unit, or relative to the start; None for none
+Ends: TypeAlias = End | Sequence[End]  # the upper one, or both
+Limits: TypeAlias = Mapping[str, Ends] | Mapping[Metric, Ends] | Mapping[str | Metric, Ends]
 Span = tuple[float, float]  # smallest and largest allowed value, infinite without one
 
 
@@ -58,7 +61,7 @@ class Limit(NamedTuple):
 
 
 def limit_spans(
-    limits: Mapping[Any, Any] | None, known: Sequence[str], start: Mapping[str, float] | None = None
+    limits: Limits | None, known: Sequence[str], start: Mapping[str, float] | None = None
 ) -> dict[str, Span]:
     """The smallest and the largest allowed value of metrics by their current names, infinite without one.
 
@@ -83,7 +86,7 @@ def limit_spans(
     return spans
 
 
-def limit_ranges(limits: Mapping[Any, Any] | None, known: Sequence[str]) -> dict[str, LimitRange]:
+def limit_ranges(limits: Limits | None, known: Sequence[str]) -> dict[str, LimitRange]:
     """The allowed ranges of metrics by their current names, as they are written."""
     if not isinstance(limits, Mapping | None):
         _checks.refuse("limits", "be a mapping of metrics to limits", _checks.described(limits), EXAMPLE)
@@ -93,11 +96,11 @@ def limit_ranges(limits: Mapping[Any, Any] | None, known: Sequence[str]) -> dict
     }
 
 
-def _range(one: str | Metric, given: Any) -> LimitRange:
+def _range(one: str | Metric, given: Ends) -> LimitRange:
     """A limit as it is written, checked."""
     label = f"limits[{one.name if isinstance(one, Metric) else one!r}]"
     must = "be the largest allowed value, or the smallest and the largest one"
-    pair = given if isinstance(given, tuple | list) else (None, given)
+    pair = (None, given) if not isinstance(given, Sequence) or isinstance(given, str) else given
     try:
         (lower, lower_relative), (upper, upper_relative) = map(_end, pair, (-math.inf, math.inf))
     except (TypeError, ValueError):
@@ -112,7 +115,7 @@ def _range(one: str | Metric, given: Any) -> LimitRange:
     return LimitRange(lower, upper, (lower_relative, upper_relative))
 
 
-def _end(end: Any, default: float) -> tuple[float, bool]:
+def _end(end: End, default: float) -> tuple[float, bool]:
     """One end of a limit as a number, and whether it is relative to the start; the default for None."""
     if isinstance(end, str):
         share = PERCENT.fullmatch(end.strip())
@@ -154,6 +157,6 @@ def limit_ends(limits: Iterable[Limit]) -> list[LimitEnd]:
     return [end for end in ends if math.isfinite(end.value)]
 
 
-def margins(ends: Iterable[LimitEnd], values: Mapping[str, Any]) -> np.ndarray:
+def margins(ends: Iterable[LimitEnd], values: Mapping[str, float | np.ndarray]) -> np.ndarray:
     """Relative distances to ends of limits, negative beyond them."""
     return np.array([end.sign * (end.value - values[end.name]) / end.scale for end in ends])

@@ -1,7 +1,7 @@
 """What a tuning computes of a vehicle: metrics on one road or over scenarios, in one compiled program."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, final
+from collections.abc import Sequence
+from typing import NamedTuple, final
 
 import equinox as eqx
 import jax
@@ -17,7 +17,7 @@ from jaxdamp.simulation import Ride, moves_axles
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.scenario_ride import ScenarioRide
 from jaxdamp.tune.scenarios import Road, Scenarios
-from jaxdamp.tune.settings import RUN
+from jaxdamp.tune.settings import RUN, Run
 from jaxdamp.tune.shape import ShapeNumbers
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -26,9 +26,7 @@ LANES = 16  # points side by side in one call of the compiled program
 FORWARD = 5  # parameters for each result, up to which forward derivatives of so many lanes are faster
 
 
-def ride_on(
-    vehicle: AbstractVehicle, road: Road | Scenarios, objective: Objective, run: Mapping[str, Any]
-) -> Ride | ScenarioRide:
+def ride_on(vehicle: AbstractVehicle, road: Road | Scenarios, objective: Objective, run: Run) -> Ride | ScenarioRide:
     """The ride of a vehicle on a road or in scenarios, with all metrics of an objective."""
     if isinstance(road, Scenarios):
         return road.ride(vehicle, metrics=objective.metrics, **run)
@@ -57,7 +55,7 @@ class Measurement(eqx.Module):
         *,
         each: Sequence[str] = (),
         curves: ShapeNumbers | None = None,
-        run: Mapping[str, Any] = RUN,
+        run: Run = RUN,
     ) -> None:
         self.objective, self.each_of = objective, tuple(each)
         self.curves = ShapeNumbers(()) if curves is None else curves
@@ -90,7 +88,7 @@ class Measurement(eqx.Module):
         """The names of the values of one metric in every scenario; itself on one road."""
         return [f"{name} in {scenario!r}" for scenario in self.scenario_names] or [name]
 
-    def each(self, vehicle: AbstractVehicle) -> dict[str, Any]:
+    def each(self, vehicle: AbstractVehicle) -> dict[str, Array]:
         """The metrics and the objective of a vehicle in each scenario, shape (scenarios,)."""
         assert isinstance(self.ride, ScenarioRide)
         return self.objective.of_each(self.ride.of_vehicle(vehicle).each())

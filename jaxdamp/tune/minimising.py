@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Unpack
+from typing import Unpack
 
 import jax.numpy as jnp
 import numpy as np
@@ -40,6 +40,7 @@ from jaxdamp.tune.verdict import (
     without_effect,
     workshop_notes,
 )
+from jaxdamp.vehicles import AbstractVehicle
 
 
 OUTWARDS = 1e-3  # of what the search reached, by which a relaxed limit is beyond it
@@ -163,7 +164,7 @@ def _best(descent: Descent | Driven, several: Sequence[Ended], limits: Sequence[
 
 
 def _attempts(
-    task: DesignTask[Any], starts: np.ndarray, several: Sequence[Ended], limits: Sequence[Limit]
+    task: DesignTask[AbstractVehicle], starts: np.ndarray, several: Sequence[Ended], limits: Sequence[Limit]
 ) -> tuple[Attempt, ...]:
     """The searches from several starts, given by their coordinates."""
     pairs = zip(starts * task.space.unit, several, strict=True)
@@ -180,7 +181,7 @@ def _attempts(
     )
 
 
-def _status(task: DesignTask[Any], ended: Ended, short: Sequence[Limit]) -> Status:
+def _status(task: DesignTask[AbstractVehicle], ended: Ended, short: Sequence[Limit]) -> Status:
     if short:
         return Status.LIMIT_NOT_MET
     if ended.slope_left < task.tolerance.slope:
@@ -189,7 +190,7 @@ def _status(task: DesignTask[Any], ended: Ended, short: Sequence[Limit]) -> Stat
 
 
 def _result(
-    evaluator: Evaluator,
+    evaluator: Evaluator[V],
     start: Evaluation,
     ended: Ended,
     attempts: tuple[Attempt, ...],
@@ -197,7 +198,7 @@ def _result(
     max_steps: int,
     fresh_roads: int,
     again: int = 0,
-) -> TuneResult[Any]:
+) -> TuneResult[V]:
     """The result of a tuning, judged: what holds it, what it misses, and what it is worth on fresh roads.
 
     Limits are those of the task and those of the search, which are tighter after it was repeated so many times.
@@ -270,7 +271,7 @@ def _on_fresh_roads(
 
 
 def _in_scenarios(
-    task: DesignTask[Any], tuned: Any, before: dict[str, float], after: dict[str, float]
+    task: DesignTask[AbstractVehicle], tuned: AbstractVehicle, before: dict[str, float], after: dict[str, float]
 ) -> tuple[ScenarioValues | None, list[dict[str, float]]]:
     """All metrics in every scenario, and those that are reported: joined by the true risk, not by a smooth one."""
     measured, names = task.measured, task.units
@@ -282,7 +283,7 @@ def _in_scenarios(
     return ScenarioValues(measured.scenario_names, *sides), joined
 
 
-def _where(task: DesignTask[Any], fresh_roads: int) -> str:
+def _where(task: DesignTask[AbstractVehicle], fresh_roads: int) -> str:
     """Where the numbers of a tuning hold that was not tried on fresh roads, in words."""
     if is_white(task.road):
         return "in the mean of all such roads"

@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple, TypeAlias, final
+from typing import NamedTuple, TypeAlias, final
 
 import jax
 import jax.numpy as jnp
@@ -24,13 +24,14 @@ from jaxdamp.metrics import (
     settling_time,
     smooth_settling_time,
 )
+from jaxdamp.tune.limits import Limits
 from jaxdamp.vehicles import AbstractVehicle, is_stationary
 
 
 DOUBLINGS = 5  # of the exponent: the smooth peak has the power 32
 
 
-def _powers(y: Array, first: Any) -> Array:
+def _powers(y: Array, first: Array | None) -> Array:
     """An even power, by squaring."""
     del first
     for _ in range(DOUBLINGS):
@@ -236,15 +237,16 @@ def _mean_of(word: str, names: tuple[str, ...]) -> Function:
     return mean_of_all
 
 
-def goal_limits(limits: Any, vehicle: AbstractVehicle, *, white: bool, known: Sequence[str] = ()) -> Any:
+def goal_limits(
+    limits: Limits | None, vehicle: AbstractVehicle, *, white: bool, known: Sequence[str] = ()
+) -> Limits | None:
     """Limits with "comfort", "travel" and "grip" spelled out: each metric of a goal gets its limit."""
     if not isinstance(limits, Mapping):
         return limits
     spelled = {}
     for one, span in limits.items():
-        several = isinstance(one, str) and one not in known
-        for name in metrics_of("limits", one, vehicle, white=white) if several else [one]:
-            spelled[name] = span
+        names = metrics_of("limits", one, vehicle, white=white) if isinstance(one, str) and one not in known else [one]
+        spelled |= dict.fromkeys(names, span)
     return spelled
 
 
@@ -255,7 +257,7 @@ def metrics_of(argument: str, one: str, vehicle: AbstractVehicle, *, white: bool
     return vehicle.goal_metrics(current, white=white)
 
 
-def check_objective(argument: str, one: Any, remedy: str) -> None:
+def check_objective(argument: str, one: object, remedy: str) -> None:
     """Refuse what is no objective."""
     if not isinstance(one, str | Metric) and not callable(one):
         must = "be the name of a ride metric, a Metric, or a function of the metrics"
@@ -266,7 +268,7 @@ def _for_information(metric: Metric) -> bool:
     return metric.weighting is None and metric.statistic.differentiable and not metric.statistic.signed
 
 
-def _name(function: Any) -> str:
+def _name(function: object) -> str:
     name = getattr(function, "__name__", "")
     return name if name.isidentifier() else "objective"
 
@@ -334,7 +336,7 @@ class Targets:
         return f"target {plus_minus(target, tolerance)}, {met}"
 
 
-def _pair(metric: str | Metric, pair: Any) -> tuple[float, float]:
+def _pair(metric: str | Metric, pair: tuple[float, float]) -> tuple[float, float]:
     label = f"targets[{metric.name if isinstance(metric, Metric) else metric!r}]"
     numbers = np.shape(pair) == (2,) and np.asarray(pair).dtype.kind in "iuf"
     if not numbers or not np.all(np.isfinite(pair)) or not pair[1] > 0:

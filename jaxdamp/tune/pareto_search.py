@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Unpack
+from typing import Unpack
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from jaxdamp.tune.settings import DEFAULTS, Settings, completed
 from jaxdamp.tune.task import DesignTask, Evaluator, check_call
 from jaxdamp.tune.tracing import NO_CONFLICT, FrontProblem, lattice, range_of, trace_front
 from jaxdamp.tune.verdict import missed_notes
+from jaxdamp.vehicles import AbstractVehicle
 
 
 BEYOND = 0.1  # distance of the default reference point beyond the worst values, relative to their range
@@ -139,7 +140,7 @@ def _parameters(space: SearchRange) -> tuple[FrontParameter, ...]:
     return tuple(FrontParameter(c.name, c.unit, c.before, c.lower, c.upper) for c in space.changes(space.start))
 
 
-def _check(objectives: Any, vehicle: Any, road: Any, points: int, counts: Mapping[str, Any]) -> None:
+def _check(objectives: object, vehicle: object, road: object, points: int, counts: Mapping[str, object]) -> None:
     call = "pareto([metric, metric], vehicle, road)"
     if isinstance(objectives, str) or not isinstance(objectives, Sequence) or len(objectives) not in (2, 3):
         _checks.refuse(
@@ -205,7 +206,7 @@ def _ends_of(best: Sequence[SearchState], max_steps: int) -> tuple[Status, list[
     return status, [f"{len(failed)} of {len(best)} points are not optima: {status.sentence}"]
 
 
-def _at_bounds(best: Sequence[SearchState], task: DesignTask[Any]) -> list[str]:
+def _at_bounds(best: Sequence[SearchState], task: DesignTask[AbstractVehicle]) -> list[str]:
     """A sentence for each parameter at a bound."""
     sides, notes = [task.space.side(state.y * task.space.unit) for state in best], []
     for name, column in zip(task.space.free.names, zip(*sides, strict=True), strict=True):
@@ -215,7 +216,9 @@ def _at_bounds(best: Sequence[SearchState], task: DesignTask[Any]) -> list[str]:
     return notes
 
 
-def _notes_on_points(front: ParetoFront, task: DesignTask[Any], start_on_fresh: Mapping[str, np.ndarray]) -> list[str]:
+def _notes_on_points(
+    front: ParetoFront, task: DesignTask[AbstractVehicle], start_on_fresh: Mapping[str, np.ndarray]
+) -> list[str]:
     """Limits that the points do not keep by their true values or on fresh roads; doubts about step and fitted ranges.
 
     The step and the ranges are looked at at the ends and the knee of the front.

@@ -3,12 +3,13 @@
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, TypeAlias, final
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from jaxdamp import _checks
+from jaxdamp._random import sobol_sequence
 from jaxdamp._tables import with_tied
 from jaxdamp.dampers import not_identified
 from jaxdamp.parameters import (
@@ -63,6 +64,9 @@ class Choice:
         """The nearest values on both sides."""
         place = int(np.searchsorted(self.values, value))
         return list(dict.fromkeys([self.values[max(place - 1, 0)], self.values[min(place, len(self.values) - 1)]]))
+
+
+Bound: TypeAlias = Sequence[float | int | None] | np.ndarray | Choice | None  # a lower and an upper one, or choices
 
 
 class Change(NamedTuple):
@@ -126,10 +130,10 @@ class SearchRange:
 
 
 def search_range(
-    vehicle: Any,
-    over: Sequence[str] | Mapping[str, Any] | None,
+    vehicle: object,
+    over: Sequence[str] | Mapping[str, object] | None,
     freeze: Sequence[str],
-    bounds: Mapping[str, Any] | None,
+    bounds: Mapping[str, object] | None,
     tie: Mapping[str, str] | None = None,
 ) -> SearchRange:
     """The free parameters and their ranges: of all dampers what can be changed and is known, if `over` is None."""
@@ -169,12 +173,9 @@ def start_points(space: SearchRange, count: int, seed: int) -> np.ndarray:
     Numbers between positive bounds are uniform in their logarithm. Without a bound, numbers are within three times
     their unit. The numbers of ordered vectors are sorted.
     """
-    from scipy.stats import qmc
-
     lower = np.where(np.isfinite(space.lower), space.lower, space.start - FACTOR * space.unit)
     upper = np.where(np.isfinite(space.upper), space.upper, space.start + FACTOR * space.unit)
-    options: dict = {"seed": np.random.default_rng(seed)}  # SciPy 1.15 calls it `rng`, and still takes this name
-    unit = qmc.Sobol(len(lower), **options).random_base2(max(count - 2, 0).bit_length())[: count - 1]
+    unit = sobol_sequence(len(lower), seed).random_base2(max(count - 2, 0).bit_length())[: count - 1]
     points = lower + (upper - lower) * unit
     logarithmic = lower > 0
     ratio = upper[logarithmic] / lower[logarithmic]
@@ -187,7 +188,7 @@ def start_points(space: SearchRange, count: int, seed: int) -> np.ndarray:
     return np.concatenate([space.start[None], points])
 
 
-def _adjustable(vehicle: Any) -> tuple[list[str], tuple[str, ...]]:
+def _adjustable(vehicle: object) -> tuple[list[str], tuple[str, ...]]:
     """The parameters of the dampers that a workshop can change, and apart those that no record determined."""
     by_path = {p.path: p for p in parameters(vehicle)}
     inside = match_paths(list(by_path), DAMPERS)
@@ -202,7 +203,7 @@ def _adjustable(vehicle: Any) -> tuple[list[str], tuple[str, ...]]:
     return [path for path in adjustable if path not in unknown], undetermined
 
 
-def _given(argument: str, bounds: Mapping[str, Any], free: FreeParameters) -> dict[str, Pair | Choice]:
+def _given(argument: str, bounds: Mapping[str, object], free: FreeParameters) -> dict[str, Pair | Choice]:
     """Bounds by path, infinite without a bound. If two names match a parameter, the later one counts."""
     if not isinstance(bounds, Mapping):
         remedy = "Write `{'damper.rate': (1000.0, 5000.0)}`."
@@ -219,7 +220,7 @@ def _given(argument: str, bounds: Mapping[str, Any], free: FreeParameters) -> di
     return by_path
 
 
-def _pair(argument: str, name: str, bound: Any) -> Pair | Choice:
+def _pair(argument: str, name: str, bound: object) -> Pair | Choice:
     """A lower and an upper bound as numbers, or a choice."""
     if isinstance(bound, Choice):
         return bound

@@ -4,7 +4,7 @@ import dataclasses
 import itertools
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, Unpack, final
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias, Unpack, final
 
 import numpy as np
 from jaxtyping import Float
@@ -13,7 +13,7 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._pieces import piece
 from jaxdamp._results import AbstractResult, drawn_by
-from jaxdamp._tables import Column, Compared, Table, comparison_table, plain
+from jaxdamp._tables import Column, Compared, Contents, Table, comparison_table, plain
 from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric
 from jaxdamp.roads import AbstractRoad, WhiteRoad
@@ -45,7 +45,7 @@ def spectra(
     vehicle: AbstractVehicle,
     road: AbstractRoad | WhiteRoad,
     channels: Sequence[str],
-    run: Mapping[str, Any],
+    run: Run,
 ) -> dict[str, Spectrum]:
     """The spectrum of each channel between 0.3 and 30 Hz.
 
@@ -158,7 +158,7 @@ class Rescore(AbstractResult):
 
     plot = drawn_by("rescore", "The change of each ride metric on each road.")
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """All metrics on each road with units, ready for JSON; numbers that are not finite are None."""
         metrics = {
             name: {"before": plain(before), "after": plain(self.after[name]), "unit": self.units[name]}
@@ -168,7 +168,7 @@ class Rescore(AbstractResult):
 
 
 def rescore(
-    result: "TuneResult[Any]",
+    result: "TuneResult[AbstractVehicle]",
     roads: Sequence[AbstractRoad | Scenarios],
     **run: Unpack[Run],
 ) -> Rescore:
@@ -207,7 +207,7 @@ def rescore(
     metrics += [m for m in (objective.metrics if objective else ()) if m not in metrics]
     units = {m.name: m.unit(result.start.units) for m in metrics} | (objective.units(result.start) if objective else {})
     cars = (result.start, result.vehicle)
-    drive = driver(cars, metrics, objective, completed("rescore", run, RUN))
+    drive = driver(cars, metrics, objective, Run(**completed("rescore", run, RUN)))
     return rescored(drive, roads, units, result.metric)
 
 
@@ -220,7 +220,7 @@ def driver(
     cars: tuple[AbstractVehicle, AbstractVehicle],
     metrics: Sequence[Metric],
     objective: Objective | None,
-    run: Mapping[str, Any],
+    run: Run,
 ) -> Driver:
     """The metrics of two vehicles on a road or in scenarios."""
 
@@ -236,7 +236,7 @@ def driver(
     return lambda road: [drive(car, road) for car in cars]
 
 
-def rescored(drive: Driver, roads: Sequence[Any], units: dict[str, str], metric: str) -> Rescore:
+def rescored(drive: Driver, roads: Sequence[Road | Scenarios], units: dict[str, str], metric: str) -> Rescore:
     """The metrics of the vehicle before and after on roads or in scenarios."""
     runs = [drive(road) for road in roads]
     before, after = ({name: np.array([float(pair[side][name]) for pair in runs]) for name in units} for side in (0, 1))
@@ -246,7 +246,7 @@ def rescored(drive: Driver, roads: Sequence[Any], units: dict[str, str], metric:
 def on_fresh_roads(
     drive: Driver,
     inputs: tuple[object, ...],
-    road: Any,
+    road: Road | Scenarios,
     numbers: Sequence[int],
     allowed: Mapping[str, LimitRange],
     units: dict[str, str],
@@ -279,7 +279,7 @@ def on_fresh_roads(
     return driven
 
 
-def other_roads(road: Any, numbers: Sequence[int]) -> list[Any]:
+def other_roads(road: Road | Scenarios, numbers: Sequence[int]) -> list[Road | Scenarios]:
     """Other realisations of a random road, or of scenarios on random roads; none of others."""
     if isinstance(road, Scenarios):
         roads = [road.on_other_roads(FIRST_SEED + i) for i in numbers]

@@ -3,8 +3,8 @@
 import dataclasses
 import math
 import warnings
-from collections.abc import Mapping, Sequence
-from typing import Any, Generic, NamedTuple, TypeVar
+from collections.abc import Sequence
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 from jaxtyping import Float
@@ -13,7 +13,17 @@ from jaxdamp import _checks
 from jaxdamp._display import display
 from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
-from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, typeset_unit, with_unit
+from jaxdamp._tables import (
+    Column,
+    Compared,
+    Contents,
+    Table,
+    comparison_table,
+    percent_change,
+    plain,
+    typeset_unit,
+    with_unit,
+)
 from jaxdamp._types import Figure
 from jaxdamp.tune.combinations import Combinations
 from jaxdamp.tune.limits import LimitRange, written
@@ -21,11 +31,12 @@ from jaxdamp.tune.objective import Objective, Targets
 from jaxdamp.tune.ranges import Change
 from jaxdamp.tune.rescoring import Rescore, Spectrum, spectra
 from jaxdamp.tune.scenarios import Road
+from jaxdamp.tune.settings import Run
 from jaxdamp.tune.verdict import Verdict, mean_change, verdict_of
 from jaxdamp.vehicles import AbstractVehicle
 
 
-V = TypeVar("V", bound=AbstractVehicle)
+V = TypeVar("V", bound=AbstractVehicle, covariant=True)
 NAMED = 2  # parameters at bounds that a summary names; of more it says how many, and the table which
 
 
@@ -41,7 +52,7 @@ class Drive(NamedTuple):
     """What a tuning drove over: a road, that of the first scenario, and how: the keywords of `Run`."""
 
     road: Road
-    run: Mapping[str, Any]
+    run: Run
 
 
 class Attempt(NamedTuple):
@@ -136,7 +147,7 @@ class TuneResult(AbstractResult, Generic[V]):
         """Better or not, by how much and at what price: on fresh roads if there are any."""
         return verdict_of(self)
 
-    def plot(self, kind: str = "changes", **options: Any) -> Figure:
+    def plot(self, kind: str = "changes", **options: object) -> Figure:
         """The laws and the metrics before and after, or the sheet of the ride.
 
         Arguments:
@@ -283,7 +294,7 @@ class TuneResult(AbstractResult, Generic[V]):
         driven = {"combinations": self.combinations.table()} if self.combinations else {}
         return {"metrics": self.table(), "parameters": self.parameter_table()} | driven | several | tolerances
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """The tuning as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         sides = {"before": self.before, "after": self.after}
         words = ("metric", "violated", "active", "active_limits", "relaxation", "without_effect")

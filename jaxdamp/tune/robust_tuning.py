@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Unpack
+from typing import Unpack
 
 import numpy as np
 
@@ -15,9 +15,9 @@ from jaxdamp.tune.minimising import minimise
 from jaxdamp.tune.objective import Function
 from jaxdamp.tune.result import ToleranceEffect, TuneResult, V
 from jaxdamp.tune.scenario_ride import Risk
-from jaxdamp.tune.scenarios import Scenarios
+from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.sensitivities import sensitivity
-from jaxdamp.tune.settings import RUN, Run, Settings, completed
+from jaxdamp.tune.settings import RUN, Run, Settings, completed, run_of
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -65,16 +65,15 @@ def robust(
     tuning = minimise(metric, vehicle, scenarios, progress=progress, **settings)
     if not scatter:
         return tuning
-    run: dict[str, Any] = {name: value for name, value in settings.items() if name in RUN}
-    effects = tolerance_effects(metric, tuning.vehicle, scenarios, scatter, **run)
+    effects = tolerance_effects(metric, tuning.vehicle, scenarios, scatter, **run_of(settings))
     return dataclasses.replace(tuning, tolerances=effects)
 
 
 @of_known_numbers
 def tolerance_effects(
-    metric: Any,
+    metric: str | Metric | Function,
     vehicle: AbstractVehicle,
-    road: Any,
+    road: Road | Scenarios,
     scatter: Mapping[str, float],
     **run: Unpack[Run],
 ) -> tuple[ToleranceEffect, ...]:
@@ -118,7 +117,7 @@ def tolerance_effects(
     return tuple(sorted(effects, key=lambda effect: -effect.deviation))
 
 
-def check_scatter(scatter: Any) -> None:
+def check_scatter(scatter: object) -> None:
     """Refuse what is no mapping of parameters to positive standard deviations."""
     remedy = "Write `{'damper.**_rate': 0.1}`: 0.1 is a standard deviation of 10 %."
     if not isinstance(scatter, Mapping) or not scatter:

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias, final
+from typing import TYPE_CHECKING, TypeAlias, TypeVar, final
 
 import equinox as eqx
 import jax
@@ -14,11 +14,12 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._jacobian import Mode
 from jaxdamp._limits import largest
-from jaxdamp._types import Scalar
+from jaxdamp._types import Point, Scalar
 from jaxdamp.metrics import Metric, MetricValues
 from jaxdamp.parameters import checked, get, match_paths, modules_inside, replace, with_values
 from jaxdamp.roads import WhiteRoad
 from jaxdamp.simulation import Ride, moves_axles
+from jaxdamp.tune.settings import Run
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 Values: TypeAlias = Float[Array, " scenarios"]
 Risk: TypeAlias = Callable[[Values, Values], Scalar]  # of the values and their weights, which add up to one
+T = TypeVar("T")
 SHARPNESS = 100.0  # of the smooth maximum
 
 
@@ -149,14 +151,14 @@ class ScenarioRide(eqx.Module):
         """Why the vehicle cannot have the values of each of many points: a text, empty where it can."""
         return self.ride.out_of_domain(columns)
 
-    def each(self, point: Mapping[str, Any] | None = None) -> dict[str, Float[Array, " scenarios"]]:
+    def each(self, point: Point | None = None) -> dict[str, Float[Array, " scenarios"]]:
         """The metrics by name in every scenario, with other values of the parameters at these paths."""
         point = dict(point or {})
         vehicle = replace(self.vehicle, point) if point else self.vehicle
         if point:
             self.refuse_moved_axles("point", lambda values: replace(self.vehicle, values), point)
 
-        def one(road: Any, factors: dict[str, Any], offsets: dict[str, Any]) -> dict[str, Scalar]:
+        def one(road: Array | WhiteRoad, factors: dict[str, Array], offsets: dict[str, Array]) -> dict[str, Scalar]:
             changed = {path: factors[path] * get(vehicle, path) + offsets[path] for path in factors}
             ride = self.ride.of_vehicle(with_values(vehicle, changed))
             field = "road" if isinstance(self.roads, WhiteRoad) else "heights"
@@ -165,7 +167,7 @@ class ScenarioRide(eqx.Module):
         by_name = jax.vmap(one)(self.roads, self.factors, self.offsets)
         return MetricValues.with_units({m.name: by_name[m.name] for m in self.metrics}, self.units)
 
-    def refuse_moved_axles(self, argument: str, build: Callable[[Any], AbstractVehicle], values: Any) -> None:
+    def refuse_moved_axles(self, argument: str, build: Callable[[T], AbstractVehicle], values: T) -> None:
         """Refuse values that move an axle, where the road under it has been sampled already."""
         if self.delays_axles and moves_axles(build, values):
             remedy = "Change it on one road at a time, or on `roads.white`."
@@ -173,21 +175,25 @@ class ScenarioRide(eqx.Module):
                 argument, "not move an axle in scenarios, whose roads are sampled once", "one that does", remedy
             )
 
-    def __call__(self, point: Mapping[str, Any] | None = None) -> dict[str, Scalar]:
+    def __call__(self, point: Point | None = None) -> dict[str, Scalar]:
         """The metrics by name, one number for all scenarios."""
         values = {name: self.risk(each, self.weights) for name, each in self.each(point).items()}
         return MetricValues.with_units(values, self.units)
 
 
 def scenario_ride(
-    vehicle: AbstractVehicle, scenarios: Sequence["Scenario"], risk: Risk, options: Mapping[str, Any]
+    vehicle: AbstractVehicle,
+    scenarios: Sequence["Scenario"],
+    risk: Risk,
+    metrics: Sequence[str | Metric] | None,
+    run: Run,
 ) -> ScenarioRide:
     """The ride of a vehicle in scenarios, after the checks of a `Ride` on each road and in each condition."""
     check_module("vehicle", vehicle, (AbstractVehicle,), "scenarios.ride(vehicle)")
     changes = _changes(vehicle, [scenario.condition for scenario in scenarios])
-    first, rides = _checked_rides(vehicle, scenarios, changes, options)
+    first, rides = _checked_rides(vehicle, scenarios, changes, metrics, run)
     white = isinstance(scenarios[0].road, WhiteRoad)
-    inputs: Any = [ride.road if white else ride.heights for ride in rides]
+    inputs = [ride.road if white else ride.heights for ride in rides]
     common = eqx.tree_at(
         lambda r: (r.vehicle, r.road), first, (vehicle, inputs[0] if white else None), is_leaf=lambda leaf: leaf is None
     )
@@ -212,7 +218,8 @@ def _checked_rides(
     vehicle: AbstractVehicle,
     scenarios: Sequence["Scenario"],
     changes: Mapping[str, Sequence[tuple[Array, Array]]],
-    options: Mapping[str, Any],
+    metrics: Sequence[str | Metric] | None,
+    run: Run,
 ) -> tuple[Ride, list[Ride]]:
     """The ride with the most substeps, and one on the road of each scenario; roads and conditions are checked once."""
     by_road: dict[int, Ride] = {}
@@ -221,7 +228,7 @@ def _checked_rides(
         if id(scenario.road) in by_road and scenario.road is not scenarios[0].road:
             continue
         changed = {path: pairs[i][0] * get(vehicle, path) + pairs[i][1] for path, pairs in changes.items()}
-        ride = Ride(checked(with_values(vehicle, changed)), scenario.road, **options)
+        ride = Ride(checked(with_values(vehicle, changed)), scenario.road, metrics=metrics, **run)
         by_road.setdefault(id(scenario.road), ride)
         if most is None or ride.substeps > most.substeps:
             most = ride
@@ -242,9 +249,7 @@ def _changes(vehicle: AbstractVehicle, conditions: Sequence["Condition"]) -> dic
     return {path: [_change(path, np.shape(before[path]), *pair) for pair in each] for path in paths}
 
 
-def _change(
-    path: str, shape: tuple[int, ...], values: Mapping[str, Any], factors: Mapping[str, Any]
-) -> tuple[Array, Array]:
+def _change(path: str, shape: tuple[int, ...], values: Point, factors: Point) -> tuple[Array, Array]:
     """Factor and offset of a number: one and zero where the condition leaves it as it is."""
     if path in values and path in factors:
         _checks.refuse("Condition", f"have a value or a factor for {path}", "both", "Multiply the value by the factor.")
@@ -256,7 +261,7 @@ def _change(
     return tuple(broadcast)  # type: ignore[return-value]
 
 
-def numbers(tree: Any) -> dict[str, Any]:
+def numbers(tree: eqx.Module) -> dict[str, Array]:
     """All parameters and settings of a module by path."""
     by_path = {}
     for prefix, module in modules_inside(tree):
@@ -266,7 +271,7 @@ def numbers(tree: Any) -> dict[str, Any]:
     return by_path
 
 
-def _by_path(numbers: Mapping[str, Any], changes: Mapping[str, Any], argument: str) -> dict[str, Any]:
+def _by_path(numbers: Mapping[str, Array], changes: Point, argument: str) -> Point:
     if not isinstance(changes, Mapping):
         _checks.refuse(
             argument, "be a mapping of parameters to numbers", repr(changes), "Write `{'sprung_mass': 1e3}`."

@@ -3,21 +3,25 @@
 import dataclasses
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, TypeVar, final
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._random import sobol_sequence
 from jaxdamp._traced import of_known_numbers
+from jaxdamp._types import Point, Value
 from jaxdamp.metrics import Metric
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import AbstractEngine
 from jaxdamp.tune.scenario_ride import Risk, ScenarioRide, risk_of, scenario_ride
+from jaxdamp.tune.settings import Run
 from jaxdamp.vehicles import AbstractVehicle
 
 
 Road = AbstractRoad | WhiteRoad
+T = TypeVar("T")
 
 
 class Condition(NamedTuple):
@@ -31,8 +35,8 @@ class Condition(NamedTuple):
         weight: relative to the other conditions.
     """
 
-    values: Mapping[str, Any] = {}
-    factors: Mapping[str, Any] = {}
+    values: Mapping[str, Value] = {}
+    factors: Mapping[str, Value] = {}
     weight: float = 1.0
 
 
@@ -87,28 +91,28 @@ class Scenarios:
         weights: Mapping[str, float] | Sequence[float] | None = None,
         risk: str | Risk = "mean",
     ) -> None:
-        roads = _named("roads", roads, "road")
-        conditions = _named("conditions", conditions, "condition") or {"": Condition()}
-        if not roads:
+        on = _named("roads", roads, "road")
+        under = _named("conditions", conditions, "condition") or {"": Condition()}
+        if not on:
             _checks.refuse("roads", "hold one or more", "empty", "Write `[roads.iso8608('C', 20.0, seed=1)]`.")
-        for name, road in roads.items():
+        for name, road in on.items():
             check_module(f"roads[{name!r}]", road, (AbstractRoad, WhiteRoad), "Scenarios(roads)")
-        if len({isinstance(road, WhiteRoad) for road in roads.values()}) > 1:
+        if len({isinstance(road, WhiteRoad) for road in on.values()}) > 1:
             remedy = "Drive over all of them, or take `roads.white` for all of them."
             _checks.refuse("roads", "be all white or all driven over", "a mixture", remedy)
-        for name, condition in conditions.items():
+        for name, condition in under.items():
             must = "be a `tune.Condition(values, factors)`"
             remedy = "Write `tune.Condition({'sprung_mass': 1500.0})`."
             _checks.instance(f"conditions[{name!r}]", condition, Condition, must, remedy)
-        of_roads = _weights(roads, weights)
-        pairs = list(itertools.product(roads.items(), conditions.items()))
+        of_roads = _weights(on, weights)
+        pairs = list(itertools.product(on.items(), under.items()))
         shares = np.array([of_roads[road] * condition.weight for (road, _), (_, condition) in pairs])
         if not np.all(np.isfinite(shares)) or np.any(shares < 0) or not np.any(shares > 0):
             _checks.refuse(
                 "weights", "be 0 or more, some of them positive", shares.tolist(), "Leave them out for equal ones."
             )
         object.__setattr__(self, "risk", risk_of(risk))
-        object.__setattr__(self, "_counts", (len(roads), len(conditions)))
+        object.__setattr__(self, "_counts", (len(on), len(under)))
         scenarios = (
             Scenario(", ".join(filter(None, (road_name, name))), road, condition, float(share))
             for ((road_name, road), (name, condition)), share in zip(pairs, shares / shares.sum(), strict=True)
@@ -140,7 +144,7 @@ class Scenarios:
         """The same scenarios with another risk."""
         return self._with("risk", risk_of(risk))
 
-    def _with(self, name: str, value: Any) -> "Scenarios":
+    def _with(self, name: str, value: object) -> "Scenarios":
         other = object.__new__(Scenarios)
         for field in dataclasses.fields(self):
             object.__setattr__(other, field.name, value if field.name == name else getattr(self, field.name))
@@ -160,8 +164,8 @@ class Scenarios:
         Raises:
             ValueError: what `Ride` refuses on one of the roads, and paths that the vehicle does not have.
         """
-        options = {"metrics": metrics, "duration": duration, "dt": dt, "engine": engine}
-        return scenario_ride(vehicle, self.scenarios, self.risk, options)
+        run = Run(duration=duration, dt=dt, engine=engine)
+        return scenario_ride(vehicle, self.scenarios, self.risk, metrics, run)
 
 
 @of_known_numbers
@@ -181,7 +185,7 @@ def tolerances(scatter: Mapping[str, float], count: int, *, seed: int = 0) -> di
     >>> list(tolerances({"damper.rate": 0.1}, 2)["sample 1"].factors)
     ['damper.rate']
     """
-    from scipy.stats import qmc, truncnorm
+    from scipy.stats import truncnorm
 
     if not scatter:
         _checks.refuse("scatter", "name one or more parameters", scatter, "Write `{'damper.**_rate': 0.05}`.")
@@ -191,8 +195,7 @@ def tolerances(scatter: Mapping[str, float], count: int, *, seed: int = 0) -> di
             _checks.refuse(f"scatter[{name!r}]", "be above 0 and below 1/3", deviation, remedy)
     if count < 1:
         _checks.refuse("count", "be one or more", count)
-    options: Any = {"seed": np.random.default_rng(seed)}  # SciPy 1.15 calls it `rng`, and still takes this name
-    unit = qmc.Sobol(len(scatter), **options).random_base2((count - 1).bit_length())[:count]
+    unit = sobol_sequence(len(scatter), seed).random_base2((count - 1).bit_length())[:count]
     factors = 1.0 + truncnorm.ppf(unit, -3.0, 3.0) * np.array(list(scatter.values()))
     return {
         f"sample {i + 1}": Condition(factors=dict(zip(scatter, map(float, row), strict=True)))
@@ -201,7 +204,7 @@ def tolerances(scatter: Mapping[str, float], count: int, *, seed: int = 0) -> di
 
 
 @of_known_numbers
-def samples(values: Mapping[str, Any]) -> dict[str, Condition]:
+def samples(values: Point) -> dict[str, Condition]:
     """Conditions of given values, one for each sample: those of a fitted law from its posterior, for instance.
 
     Arguments:
@@ -224,7 +227,7 @@ def samples(values: Mapping[str, Any]) -> dict[str, Condition]:
     }
 
 
-def _named(argument: str, given: Any, word: str) -> dict[str, Any]:
+def _named(argument: str, given: Mapping[str, T] | Sequence[T], word: str) -> dict[str, T]:
     """Roads or conditions by name: those of a sequence are numbered."""
     if isinstance(given, Mapping):
         return {str(name): one for name, one in given.items()}
@@ -234,7 +237,7 @@ def _named(argument: str, given: Any, word: str) -> dict[str, Any]:
     return {f"{word} {i + 1}": one for i, one in enumerate(given)}
 
 
-def _weights(roads: Mapping[str, Road], weights: Any) -> dict[str, float]:
+def _weights(roads: Mapping[str, Road], weights: Mapping[str, float] | Sequence[float] | None) -> dict[str, float]:
     """The weight of each road."""
     if weights is None:
         return dict.fromkeys(roads, 1.0)

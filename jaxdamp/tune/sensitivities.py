@@ -2,7 +2,7 @@
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypedDict, TypeVar, Unpack, final
+from typing import TypeAlias, TypedDict, TypeVar, Unpack, final
 
 import equinox as eqx
 import jax
@@ -36,7 +36,7 @@ from jaxdamp.tune.measuring import Measurement
 from jaxdamp.tune.objective import Function, Objective, objective_of
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.sensitivity_result import CurveSensitivity, Sensitivity
-from jaxdamp.tune.settings import RUN, Free, Run, completed
+from jaxdamp.tune.settings import RUN, Asked, Free, Run, completed, run_of
 from jaxdamp.tune.shape import damper_paths, held_force
 from jaxdamp.tune.task import is_white
 from jaxdamp.vehicles import AbstractVehicle, ChannelKind
@@ -45,6 +45,8 @@ from jaxdamp.vehicles import AbstractVehicle, ChannelKind
 REACH = 3.0  # RMS values of the damper velocity up to which the curve is looked at
 HATS = 12  # on each side
 V = TypeVar("V", bound=AbstractVehicle)
+MetricsOf: TypeAlias = Callable[[Array], Mapping[str, Scalar]]  # of the parameters, then the quantities of the road
+GIVEN = (AbstractRoad, WhiteRoad, Scenarios)  # roads that are not made from quantities
 
 
 class Curves(TypedDict, total=False):
@@ -59,7 +61,9 @@ class SensitivitySettings(Free, Curves, Run, total=False):
     """All keywords of `sensitivity`: those of `Free`, `Curves` and `Run`."""
 
 
-DEFAULTS: dict[str, Any] = {"over": ("*",), "freeze": (), "dampers": "*damper", "reach": None, "hats": HATS, **RUN}
+DEFAULTS: SensitivitySettings = {
+    "over": ("*",), "freeze": (), "dampers": "*damper", "reach": None, "hats": HATS, **RUN,
+}  # fmt: skip
 
 
 @of_known_numbers
@@ -106,13 +110,12 @@ def sensitivity(
     wanted = list(metric) if isinstance(metric, Sequence) and not isinstance(metric, str) else [metric]
     given = dict(quantities or {})
     _check(wanted, vehicle, road, given)
-    make: Any = road
-    first, run = (make(**given) if given else make), {name: asked[name] for name in RUN}
+    first, run = (road if isinstance(road, GIVEN) else road(**given)), run_of(settings)
     objective = _objective(wanted, vehicle, white=is_white(first))
     hatted, paths = _with_curves(vehicle, first, asked, run)
     of_vehicle, free = _free(vehicle, hatted, asked["over"], asked["freeze"])
     point = np.array([*np.asarray(free.values, float), *given.values()])
-    measured = _measured(hatted, make, list(given), objective, free, run)
+    measured = _measured(hatted, road, list(given), objective, free, run)
     names = [name for name in objective.units(vehicle) if name in objective.names]
     values, slopes = _derivatives(measured, names, point)
     is_curve = np.array([is_hat(p.path, hatted) for p in free.owners] + [False] * len(given), bool)
@@ -131,7 +134,7 @@ def sensitivity(
     )
 
 
-def _objective(wanted: Sequence[Any], vehicle: AbstractVehicle, *, white: bool) -> Objective:
+def _objective(wanted: Sequence[str | Metric | Function], vehicle: AbstractVehicle, *, white: bool) -> Objective:
     """The metrics that are wanted, and no others; of a function all that it may use."""
     objective = objective_of(wanted, vehicle, [], [], white=white)
     if objective.functions:
@@ -140,7 +143,7 @@ def _objective(wanted: Sequence[Any], vehicle: AbstractVehicle, *, white: bool) 
 
 
 def _with_curves(
-    vehicle: AbstractVehicle, road: Any, asked: Mapping[str, Any], run: Mapping[str, Any]
+    vehicle: AbstractVehicle, road: Road | Scenarios, asked: Asked, run: Run
 ) -> tuple[AbstractVehicle, list[str]]:
     """The vehicle with hats beside the laws whose curves are looked at, and the paths of these laws."""
     reach, hats = asked["reach"], asked["hats"]
@@ -157,7 +160,7 @@ def _with_curves(
     return vehicle, paths
 
 
-def _check(wanted: Sequence[Any], vehicle: Any, road: Any, quantities: Mapping[str, float]) -> None:
+def _check(wanted: Sequence[object], vehicle: object, road: object, quantities: Mapping[str, float]) -> None:
     call = "sensitivity(metric, vehicle, road)"
     functions = [one for one in wanted if not isinstance(one, str | Metric)]
     if not wanted or (functions and (len(wanted) > 1 or not callable(functions[0]))):
@@ -188,7 +191,7 @@ def _curves(vehicle: AbstractVehicle, pattern: str) -> list[str]:
     return chosen
 
 
-def _reach(vehicle: AbstractVehicle, road: Any, run: Mapping[str, Any]) -> float:
+def _reach(vehicle: AbstractVehicle, road: Road | Scenarios, run: Run) -> float:
     """Three times the largest RMS of a damper velocity [m/s]."""
     layout = vehicle.layout
     velocities = {m.channel for m in layout.metrics if layout.by_name[m.channel].kind is ChannelKind.DAMPER_VELOCITY}
@@ -215,29 +218,27 @@ def _free(
 
 def _measured(
     vehicle: AbstractVehicle,
-    make: Any,
+    road: Road | Scenarios | Callable[..., Road],
     names: Sequence[str],
     objective: Objective,
     free: FreeParameters,
-    run: Mapping[str, Any],
-) -> Callable[[Any], Mapping[str, Any]]:
+    run: Run,
+) -> MetricsOf:
     """The metrics as a function of the parameters and of the quantities that a road is made from, if there are any."""
-    if not names:
-        fixed = Measurement(vehicle, make, objective, free, run=run)
+    if isinstance(road, GIVEN):
+        fixed = Measurement(vehicle, road, objective, free, run=run)
         return lambda x: fixed(free.build(x))
     count = free.values.size
 
-    def measured(x: Any) -> Mapping[str, Any]:
-        road = make(**{name: x[count + i] for i, name in enumerate(names)})
-        ride = Ride(vehicle, road, metrics=objective.metrics, **run)
+    def measured(x: Array) -> Mapping[str, Scalar]:
+        on = road(**{name: x[count + i] for i, name in enumerate(names)})
+        ride = Ride(vehicle, on, metrics=objective.metrics, **run)
         return objective.of(ride.of_vehicle(free.build(x[:count]))())
 
     return measured
 
 
-def _derivatives(
-    measured: Callable[[Any], Any], names: Sequence[str], point: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _derivatives(measured: MetricsOf, names: Sequence[str], point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The metrics, shape (names,), and their derivatives, shape (names, numbers)."""
 
     def stacked(x: jax.Array) -> jax.Array:
@@ -248,7 +249,7 @@ def _derivatives(
     return np.asarray(values, float), np.asarray(slopes, float)
 
 
-def _second(measured: Callable[[Any], Any], names: Sequence[str], point: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+def _second(measured: MetricsOf, names: Sequence[str], point: np.ndarray, chosen: np.ndarray) -> np.ndarray:
     """Second derivatives by some of the numbers, shape (names, chosen, chosen)."""
     start = jnp.asarray(point)
 

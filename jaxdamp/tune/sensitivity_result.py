@@ -1,14 +1,14 @@
 """The result of `sensitivity`: tables, sentences on the flatness of an optimum, and a picture."""
 
 import dataclasses
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, drawn_by
-from jaxdamp._tables import Column, Table, plain, typeset_unit
+from jaxdamp._tables import Column, Contents, Table, plain, typeset_unit
 
 
 FORCE_STEP = 100.0  # N, for which effects of the curve are stated
@@ -148,7 +148,7 @@ class Sensitivity(AbstractResult):
 
     plot = drawn_by("sensitivity", "Damper curves coloured by their effect on each metric; effects of the parameters.")
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """All derivatives as plain data, ready for JSON; numbers that are not finite are None."""
         elasticities = {name: plain(self.elasticities(name)) for name in self.values}
         return self._data(*(field.name for field in dataclasses.fields(self))) | {"elasticities": elasticities}

@@ -2,17 +2,19 @@
 
 import difflib
 from collections.abc import Mapping, Sequence
-from typing import Any, TypedDict
+from typing import Any, TypeAlias, TypedDict
 
 from jaxdamp.metrics import Metric
 from jaxdamp.simulation import AbstractEngine
+from jaxdamp.tune.limits import Limits
+from jaxdamp.tune.ranges import Bound
 from jaxdamp.tune.shape import Shape
 
 
 class Free(TypedDict, total=False):
     """Which parameters take part: keywords of everything in `tune` that moves parameters."""
 
-    over: Sequence[str] | Mapping[str, Any] | None
+    over: Sequence[str] | Mapping[str, Bound] | None
     freeze: Sequence[str]
 
 
@@ -45,9 +47,9 @@ class Design(Free, total=False):
     (True, True)
     """
 
-    bounds: Mapping[str, Any] | None
+    bounds: Mapping[str, Bound] | None
     tie: Mapping[str, str] | None
-    limits: Mapping[Any, Any] | None
+    limits: Limits | None
     shape: Sequence[Shape] | Shape
     metrics: Sequence[str | Metric]
 
@@ -88,14 +90,20 @@ class Settings(Design, Run, Search, total=False):
 
 
 RUN = Run(duration=None, dt=None, engine=None)
-DEFAULTS: dict[str, Any] = {
+Asked: TypeAlias = dict[str, Any]  # completed settings, each of its own type
+DEFAULTS: Settings = {
     "over": None, "freeze": (), "bounds": None, "tie": None, "limits": None, "shape": (), "metrics": (), **RUN,
     "starts": 1, "seed": 0, "max_steps": 100, "fresh_roads": 32,
 }  # fmt: skip
 LEAST = {"points": 1, "between": 0, "starts": 1, "seed": 0, "max_steps": 1, "fresh_roads": 0}  # of the counts
 
 
-def completed(call: str, given: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
+def run_of(settings: Run) -> Run:
+    """How a vehicle is driven, among all settings."""
+    return Run(duration=settings.get("duration"), dt=settings.get("dt"), engine=settings.get("engine"))
+
+
+def completed(call: str, given: Mapping[str, object], defaults: Mapping[str, object]) -> Asked:
     """Settings with the defaults of a call."""
     for name in given:
         if name not in defaults:

@@ -4,7 +4,7 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
 import jax
 import jax.numpy as jnp
@@ -200,7 +200,7 @@ def _names(shape: Shape, path: str) -> list[str]:
     return [f"{shape.name} of {path}{place}" for place in shape.places]
 
 
-def _span(lower: Any, upper: Any) -> tuple[float, float]:
+def _span(lower: float | None, upper: float | None) -> tuple[float, float]:
     span = (-math.inf if lower is None else float(lower), math.inf if upper is None else float(upper))
     if not span[0] < span[1] or span == (-math.inf, math.inf):
         _checks.refuse("lower", "be below `upper`, one of them given", f"{lower}, {upper}")

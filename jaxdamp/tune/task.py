@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Generic, NamedTuple, final
+from typing import Generic, NamedTuple, final
 
 import numpy as np
 from jaxtyping import Float
@@ -29,14 +29,12 @@ from jaxdamp.tune.objective import Function, Targets, goal_limits, goal_objectiv
 from jaxdamp.tune.ranges import search_range
 from jaxdamp.tune.result import V
 from jaxdamp.tune.scenarios import Road, Scenarios
-from jaxdamp.tune.settings import LEAST, RUN
+from jaxdamp.tune.settings import LEAST, RUN, Asked, Run
 from jaxdamp.tune.shape import ShapeNumbers
 from jaxdamp.vehicles import AbstractVehicle
 
 
-def rides_on(
-    road: Road | Scenarios, metrics: Sequence[Metric], run: Mapping[str, Any]
-) -> list[Callable[[AbstractVehicle], Ride]]:
+def rides_on(road: Road | Scenarios, metrics: Sequence[Metric], run: Run) -> list[Callable[[AbstractVehicle], Ride]]:
     """For each road a function that makes the checked ride of a vehicle on it, in no special condition."""
     roads = [s.road for s in road.scenarios] if isinstance(road, Scenarios) else [road]
     distinct = list({id(one): one for one in roads}.values())
@@ -124,10 +122,10 @@ class DesignTask(Generic[V]):
         road: Road | Scenarios,
         *,
         argument: str,
-        settings: Mapping[str, Any],
+        settings: Asked,
     ) -> None:
         self.vehicle, self.road, self._argument = vehicle, road, argument
-        self.run = {name: settings[name] for name in RUN}
+        self.run = Run(**{name: settings[name] for name in RUN})
         metrics, white = settings["metrics"], is_white(road)
         further = [m.name for m in metrics if isinstance(m, Metric)]
         metric_names = [*(m.name for m in vehicle.ride_metrics), *further]
@@ -197,14 +195,14 @@ class DesignTask(Generic[V]):
 
 
 @final
-class Evaluator:
+class Evaluator(Generic[V]):
     """The rows that a search follows, at points given by their coordinates: objectives, then ends of limits.
 
     Attributes:
         program: that computes the numbers.
     """
 
-    def __init__(self, task: DesignTask[Any], lanes: int) -> None:
+    def __init__(self, task: DesignTask[V], lanes: int) -> None:
         self.task, self.program = task, BatchProgram(task.measured, task.space.free, lanes)
         self._inputs = ("metrics and slopes", task.vehicle, task.road, task.run, task.objective.name, task.names, lanes)
         self._signed = [(name, 1.0) for name in task.objective.names]
@@ -251,7 +249,7 @@ class Evaluator:
 
 
 def _metrics_of_targets(
-    objectives: Sequence[Any], metric_names: Sequence[str], limited: Sequence[Metric]
+    objectives: Sequence[str | Metric | Function], metric_names: Sequence[str], limited: Sequence[Metric]
 ) -> list[Metric]:
     """The metrics that targets are given for, after a check of their names."""
     targets = [one for one in objectives if isinstance(one, Targets)]
@@ -270,12 +268,12 @@ def _refuse_negative(allowed: Mapping[str, LimitRange], metrics: Sequence[Metric
             _checks.refuse(f"limits[{metric.name!r}]", "not be negative, as the metric never is", upper)
 
 
-def is_white(road: Any) -> bool:
+def is_white(road: object) -> bool:
     """Whether nothing is driven over."""
     return road.white if isinstance(road, Scenarios) else isinstance(road, WhiteRoad)
 
 
-def check_call(call: str, vehicle: Any, road: Any, counts: Mapping[str, Any]) -> None:
+def check_call(call: str, vehicle: object, road: object, counts: Mapping[str, object]) -> None:
     """Refuse what is no vehicle or no road, and counts below their least value."""
     check_module("vehicle", vehicle, (AbstractVehicle,), call)
     _checks.untraced("vehicle", vehicle, "Call it outside `jax.jit` and `jax.grad`; a `Ride` can be traced.")

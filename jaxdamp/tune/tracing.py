@@ -4,7 +4,7 @@ import dataclasses
 import functools
 import itertools
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from jaxdamp.tune.limits import Limit, limit_ends
 from jaxdamp.tune.measuring import LANES
 from jaxdamp.tune.ranges import SearchRange, start_points
 from jaxdamp.tune.task import DOUBLE, DesignTask, Evaluator
+from jaxdamp.vehicles import AbstractVehicle
 
 
 RADIUS = 0.5  # of the trust region of a search that goes on from another result
@@ -118,7 +119,7 @@ def _ends(
     return states, problem.solver_between(states)
 
 
-def _has_peaks(task: DesignTask[Any]) -> bool:
+def _has_peaks(task: DesignTask[AbstractVehicle]) -> bool:
     """Whether an objective or a limit is the largest or smallest value over time, so that there are many minima."""
     by_name = {metric.name: metric for metric in task.objective.metrics}
     followed = [by_name[name] for name in (*task.objective.names, *task.allowed) if name in by_name]

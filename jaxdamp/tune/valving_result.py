@@ -1,14 +1,14 @@
 """The result of a choice of valving."""
 
 import dataclasses
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._status import Status
-from jaxdamp._tables import Column, Table, with_unit
+from jaxdamp._tables import Column, Contents, Table, with_unit
 from jaxdamp.dampers import MonoTube, TwinTube
 
 
@@ -107,7 +107,7 @@ class ValvingResult(AbstractResult):
         rows = ((p.name, p.unit, p.start, p.value, p.lower, p.upper, p.note, p.meaning) for p in self.parameters)
         return Table("Valving", tuple(map(Column, names)), tuple(rows))
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """The result as numbers with units and words, ready for JSON; the law is written by `export.to_json`."""
         forces = self._data(rmse="N", velocity="m/s", target_force="N", force="N")
         error = {"error": with_unit(self.error_percent, "%")}

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, Unpack
+from typing import NamedTuple, TypeAlias, Unpack
 
 import equinox as eqx
 import jax
@@ -17,12 +17,13 @@ from jaxdamp._progress import Progress
 from jaxdamp._status import Status
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._triangles import triangle
+from jaxdamp._types import VectorLike
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper, MonoTube, TwinTube
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.rig import march, quasi_static, respond
 from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, least_squares_on_host
-from jaxdamp.tune.ranges import INSIDE, SearchRange, search_range
+from jaxdamp.tune.ranges import INSIDE, Bound, SearchRange, search_range
 from jaxdamp.tune.settings import Free, completed
 from jaxdamp.tune.valving_result import OutOfReach, ValveParameter, ValvingResult
 
@@ -40,12 +41,13 @@ APART = 2.0  # a start is a factor of up to so much from the given one, within t
 class ValvingSettings(Free, total=False):
     """Further keywords of `valving`."""
 
-    bounds: Mapping[str, Any] | None
+    bounds: Mapping[str, Bound] | None
     starts: int
     max_steps: int
 
 
 DEFAULTS = {"over": None, "freeze": (), "bounds": None, "starts": 8, "max_steps": 200}
+Target: TypeAlias = AbstractDamper | BenchRun | Sequence[BenchRun] | tuple[VectorLike, VectorLike]
 ForceOf = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]  # of values: all forces, and their derivatives
 
 
@@ -87,10 +89,10 @@ class _End(NamedTuple):
 
 @of_known_numbers
 def valving(
-    target: AbstractDamper | BenchRun | Sequence[BenchRun] | tuple[Any, Any],
+    target: Target,
     start: MonoTube | TwinTube,
     *,
-    velocities: Any = None,
+    velocities: VectorLike | None = None,
     motions: Sequence[tuple[float, float]] = (),
     tolerance: float = 0.03,
     substeps: int = 1,
@@ -189,7 +191,9 @@ def _best(
     return best
 
 
-def _wanted(target: Any, start: MonoTube | TwinTube, velocities: Any, motions: Sequence[tuple[float, float]]) -> Wanted:
+def _wanted(
+    target: Target, start: MonoTube | TwinTube, velocities: VectorLike | None, motions: Sequence[tuple[float, float]]
+) -> Wanted:
     """The target as points and loops."""
     if isinstance(target, AbstractDamper):
         points = np.asarray(VELOCITIES if velocities is None else velocities, float)
@@ -210,9 +214,10 @@ def _wanted(target: Any, start: MonoTube | TwinTube, velocities: Any, motions: S
     return Wanted(np.zeros(0), np.zeros(0), cut)
 
 
-def _points(target: tuple[Any, ...]) -> Wanted:
+def _points(target: tuple[object, ...]) -> Wanted:
     """Velocities and forces as a target."""
-    if len(target) != 2 or np.ndim(target[0]) != 1 or np.shape(target[0]) != np.shape(target[1]):
+    shapes = [np.asarray(values).shape for values in target]
+    if len(shapes) != 2 or len(shapes[0]) != 1 or shapes[0] != shapes[1]:
         _checks.refuse("target", "be velocities and as many forces", _checks.described(target))
     points, curve = (np.asarray(values, float) for values in target)
     _checks.finite("target", np.concatenate([points, curve]))

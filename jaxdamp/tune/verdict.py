@@ -2,7 +2,7 @@
 
 import enum
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -55,7 +55,7 @@ class Verdict(NamedTuple):
         return self.outcome is Outcome.BETTER
 
 
-def verdict_of(result: "TuneResult[Any]") -> Verdict:
+def verdict_of(result: "TuneResult[AbstractVehicle]") -> Verdict:
     """The verdict on a tuning: on fresh roads if there are any, otherwise on the road of the tuning."""
     outside = f" by the law, but outside its records ({'; '.join(result.extrapolated)})" * bool(result.extrapolated)
     gain, words = _change(result)
@@ -83,7 +83,7 @@ def verdict_of(result: "TuneResult[Any]") -> Verdict:
     return Verdict(outcome, f"{first}{cost}{held}.")
 
 
-def _change(result: "TuneResult[Any]") -> tuple[float, str]:
+def _change(result: "TuneResult[AbstractVehicle]") -> tuple[float, str]:
     """The change of the objective [%] and its words, with its interval and the roads that it holds for."""
     fresh, name = result.fresh, result.metric
     here = percent_change(result.before[name], result.after[name])
@@ -98,7 +98,7 @@ def _change(result: "TuneResult[Any]") -> tuple[float, str]:
     return mean, f"{name} {mean:+.1f}{error} % on {roads}"
 
 
-def _price(result: "TuneResult[Any]") -> tuple[float, str]:
+def _price(result: "TuneResult[AbstractVehicle]") -> tuple[float, str]:
     """The largest rise of a metric of body, suspension travel or tyres [%], and its name; none if nothing rises.
 
     What is limited has its own words, and so have the metrics of its channel and those that change as it does.
@@ -122,7 +122,7 @@ def _has_price(metric: Metric, vehicle: AbstractVehicle) -> bool:
     return not metric.statistic.signed and vehicle.layout.by_name[metric.channel].kind in PRICED
 
 
-def mean_change(result: "TuneResult[Any]", name: str) -> float | None:
+def mean_change(result: "TuneResult[AbstractVehicle]", name: str) -> float | None:
     """The change of a metric [%], the mean on fresh roads if there are any; none from zero."""
     if result.fresh is None or name not in result.fresh.before:
         return percent_change(result.before[name], result.after[name])
@@ -130,7 +130,7 @@ def mean_change(result: "TuneResult[Any]", name: str) -> float | None:
     return change if np.isfinite(change) else None
 
 
-def _limits_in_words(result: "TuneResult[Any]") -> str:
+def _limits_in_words(result: "TuneResult[AbstractVehicle]") -> str:
     """How much of each limit is used, and on how many fresh roads it is broken."""
     texts = []
     for name in result.limits:
@@ -144,7 +144,7 @@ def _limits_in_words(result: "TuneResult[Any]") -> str:
     return f"; limits: {'; '.join(texts)}" if texts else ""
 
 
-def lost_limits(result: "TuneResult[Any]") -> dict[str, float]:
+def lost_limits(result: "TuneResult[AbstractVehicle]") -> dict[str, float]:
     """The mean excess over limits that are broken on average over fresh roads, by more than the error of this mean."""
     if result.fresh is None or result.fresh.roads < 2:
         return {}

@@ -1,7 +1,6 @@
 import dataclasses
 import json
-from types import SimpleNamespace
-from typing import Any
+from typing import NamedTuple
 
 import jax
 import numpy as np
@@ -16,8 +15,15 @@ WHITE = roads.white("C", speed=20.0)
 quarter_car = vehicles.presets.quarter_car_000
 
 
+class Estimate(NamedTuple):
+    """What a comparison reads of an estimate."""
+
+    name: str
+    tied: tuple[str, ...]
+
+
 def estimate(name, *tied):
-    return SimpleNamespace(name=name, tied=tied)
+    return Estimate(name, tied)
 
 
 @dataclasses.dataclass
@@ -25,7 +31,7 @@ class Fitted:
     """What a comparison reads of a fit."""
 
     law: dampers.AbstractDamper
-    parameters: list[Any]
+    parameters: list[Estimate]
     covariance: np.ndarray
 
 

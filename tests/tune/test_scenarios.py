@@ -87,7 +87,7 @@ def test_tolerances_and_samples_are_conditions() -> None:
     np.testing.assert_allclose(factors.std(axis=0), [0.1, 0.02], rtol=0.03)
     assert abs(np.corrcoef(factors.T)[0, 1]) < 0.1
     values = tune.samples({"rate": [2400.0, 2600.0], "slopes": np.ones((2, 3))})
-    assert values["sample 2"].values["rate"] == 2600.0 and values["sample 1"].values["slopes"].shape == (3,)
+    assert values["sample 2"].values["rate"] == 2600.0 and np.shape(values["sample 1"].values["slopes"]) == (3,)
 
 
 WRONG_SCENARIOS = [
