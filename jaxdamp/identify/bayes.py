@@ -2,12 +2,12 @@
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, drawn_by
@@ -66,7 +66,7 @@ class Posterior(AbstractResult):
         _checks.one_of("name", name, [row.name for row in self.parameters])
         return next(row for row in self.parameters if row.name == name)
 
-    def propagate(self, function: Callable[[Any], Any]) -> Propagated:
+    def propagate(self, function: Callable[[PyTree], PyTree]) -> Propagated:
         """A function of the law over the samples, as `FitResult.propagate`."""
         model = self.evidence.model
         return over_samples(lambda values: jnp.asarray(function(model(values)), float), jnp.asarray(self.samples))

@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -150,7 +150,7 @@ def off_span(model: Model, runs: Sequence[BenchRun], initial_state: str) -> list
 def with_blended_forces(result: FitResult) -> FitResult:
     """The same fit of a `Scheduled` law with blended forces; at its levels, where the records are, both are one law."""
 
-    def is_schedule(node: Any) -> bool:
+    def is_schedule(node: object) -> bool:
         return isinstance(node, Scheduled)
 
     def changed(tree: Tree) -> Tree:

@@ -5,12 +5,12 @@ one more residual, (value − mean)/standard deviation, in units of the noise, w
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp.identify.noise import Noise
@@ -56,7 +56,7 @@ class Priors(AbstractResiduals):
     noise: Float[Array, ""]  # standard deviation of the noise of a weighted sample
     weak: bool = eqx.field(static=True, default=False)  # whether they only determine what the records do not
 
-    def __call__(self, model: Any) -> Float[Array, " samples"]:
+    def __call__(self, model: PyTree) -> Float[Array, " samples"]:
         """Distance of the values from their means, in standard deviations, times that of the noise."""
         values = zip(self.paths, self.mean, self.deviation, strict=True)
         return self.noise * jnp.concatenate([jnp.ravel((get(model, path) - m) / d) for path, m, d in values])

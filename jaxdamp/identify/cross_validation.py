@@ -11,7 +11,7 @@ from jaxdamp import _checks
 from jaxdamp._progress import Progress
 from jaxdamp._results import AbstractResult, drawn_by, worst_status
 from jaxdamp._status import Status
-from jaxdamp._tables import Column, Table, plain, with_unit
+from jaxdamp._tables import Column, Contents, Table, plain, with_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.identify.fitting import fit
@@ -163,7 +163,7 @@ class CrossValidation(AbstractResult):
         """Errors by law, and by record."""
         return {"laws": self.table(), "records": self.record_table()}
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """The errors of each law on each held-out record with units, ready for JSON."""
         folds = [
             {

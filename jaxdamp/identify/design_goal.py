@@ -2,12 +2,12 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun, Excitation, MultiSineTest, RandomTest, SineTest, TriangleTest
@@ -43,7 +43,7 @@ class Goal:
         cls,
         free: FreeParameters,
         criterion: str,
-        function: Callable[[Any], Any] | None,
+        function: Callable[[PyTree], PyTree] | None,
         prior: Mapping[str, float] | None,
     ) -> "Goal":
         """The goal of a criterion, with what is known of the parameters before."""
@@ -201,7 +201,7 @@ class Point(NamedTuple):
 WAVEFORMS = ("sine", "triangle", "random", "multisine")
 
 
-def excitation_at(point: Point, limits: MachineLimits, duration: float) -> Any | None:
+def excitation_at(point: Point, limits: MachineLimits, duration: float) -> Excitation | None:
     """The test at a point; `None` if it is outside the limits."""
     waveform, stroke, frequency = point
     low, high = limits.frequencies

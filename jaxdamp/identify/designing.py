@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, drawn_by
@@ -138,7 +138,7 @@ def design_experiment(
     frequencies: int = 7,
     sampling_rate: float = 1000.0,
     criterion: str = "D",
-    function: Callable[[Any], Any] | None = None,
+    function: Callable[[PyTree], PyTree] | None = None,
     prior: Mapping[str, float] | None = None,
     programme: Iterable[Excitation] | None = None,
     rig: Rig | None = None,
@@ -222,7 +222,7 @@ def _check(
     runs: int,
     force_noise: float,
     criterion: str,
-    function: Callable[[Any], Any] | None,
+    function: Callable[[PyTree], PyTree] | None,
 ) -> None:
     if limits is None and tests is None:
         remedy = "Write `limits=MachineLimits(stroke=0.05, velocity=1.0)` or `tests=[...]`."
@@ -250,7 +250,7 @@ def _named(tests: Sequence[Any]) -> tuple[Excitation, ...]:
 class _Pool:
     """Candidates with their information."""
 
-    keys: list[Any]  # points of a grid, or numbers
+    keys: list[Point | int]  # points of a grid, or numbers
     tests: list[Excitation]
     matrices: Float[np.ndarray, "tests free free"]
     free: FreeParameters

@@ -41,7 +41,7 @@ from jaxdamp.identify.model import (
 )
 from jaxdamp.identify.noise import Noise, noise_of
 from jaxdamp.identify.predicting import predict_runs, score
-from jaxdamp.identify.problem import Problem, linearised
+from jaxdamp.identify.problem import AbstractResiduals, Problem, linearised
 from jaxdamp.identify.propagation import Evidence
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution
@@ -235,7 +235,7 @@ def input_noise_bias(problem: Problem, best: SearchEnd, input_noise: tuple[float
     return -np.linalg.lstsq(scaled.T @ scaled, slope / scale, rcond=1e-12)[0] / scale
 
 
-def _perturbed(problem: Problem, noise: Sequence[np.ndarray]) -> tuple[Any, ...]:
+def _perturbed(problem: Problem, noise: Sequence[np.ndarray]) -> tuple[AbstractResiduals, ...]:
     """The residuals with noise added to stroke and velocity."""
     parts, begin = [], 0
     for part in problem.residuals:

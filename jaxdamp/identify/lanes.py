@@ -11,7 +11,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float, Int, PyTree
 
 from jaxdamp._jacobian import value_and_jacobian, with_jacobian
 from jaxdamp._triangles import rows_of_products
@@ -160,7 +160,7 @@ def _workers() -> ThreadPoolExecutor:
 
 
 @eqx.filter_jit
-def _prior_rows(coordinates: Coordinates, y: Any, priors: Priors) -> Array:
+def _prior_rows(coordinates: Coordinates, y: Array, priors: Priors) -> Array:
     """For each lane the derivatives of the residuals of priors, and these in the last column."""
 
     def one(y: Array) -> Array:
@@ -174,10 +174,10 @@ class _Flattened(NamedTuple):
     """A tree taken apart once for many calls; `eqx.filter_jit` would do it in each, which takes as long as the call."""
 
     structure: Hashable  # and what is no array
-    arrays: list[Any]
+    arrays: list[Array]
 
 
-def _flattened(tree: Any) -> _Flattened:
+def _flattened(tree: PyTree) -> _Flattened:
     dynamic, static = eqx.partition(tree, lambda leaf: isinstance(leaf, jax.Array | np.ndarray))
     (arrays, shape), (others, static_shape) = jax.tree.flatten(dynamic), jax.tree.flatten(static)
     return _Flattened((shape, static_shape, tuple(others)), arrays)
@@ -186,10 +186,10 @@ def _flattened(tree: Any) -> _Flattened:
 @functools.partial(jax.jit, static_argnums=0)
 def _compared(
     structure: Any,
-    arrays: list[Any],
-    y: Any,  # Float[Array, "pairs free"]
-    record: Any,  # Int[Array, " pairs"]
-    level: Any,  # Float[Array, " pairs"]
+    arrays: list[Array],
+    y: Array,  # Float[Array, "pairs free"]
+    record: Array,  # Int[Array, " pairs"]
+    level: Array,  # Float[Array, " pairs"]
 ) -> tuple[Array, Array, Array, Array, Array]:
     """For each pair of a lane and a record: products of Jacobian and residual, margins and slopes, residual, drift."""
     shape, static_shape, others = structure
@@ -198,7 +198,7 @@ def _compared(
     fields = ("dt", "stroke", "velocity", "force", "weight", "number", "fixed", "temperature", "command", "cycle")
     rows = {name: jax.tree.map(lambda a: a[record][:, None], getattr(batch, name)) for name in fields}
 
-    def compared(y: Array, row: dict[str, Any], level: Array) -> dict[str, Array]:
+    def compared(y: Array, row: dict[str, Array], level: Array) -> dict[str, Array]:
         missed, drift = dataclasses.replace(batch, **row).missed_and_drift(free.build(coordinates.to_physical(y)))
         return {"missed": missed / level, "drift": drift[0]}
 

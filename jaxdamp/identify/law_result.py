@@ -4,10 +4,10 @@ import dataclasses
 import functools
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, overload
+from typing import overload
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, PyTree
 
 from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
@@ -179,7 +179,7 @@ class FitResult(AbstractFitted, Fit):
         """`table()`."""
         return self.table()
 
-    def sensitivity_to_records(self, function: Callable[[Any], Any]) -> RecordSensitivity:
+    def sensitivity_to_records(self, function: Callable[[PyTree], PyTree]) -> RecordSensitivity:
         """Exact derivatives of a function of the law by the measured forces, through the fit itself.
 
         What would a ride metric, or the difference from another damper, be if the force of a record were 1 % larger, or

@@ -222,7 +222,7 @@ def _one_by_one(
     results = [fit(law, runs, **how) for runs in records]
     paths = free.names if rig_of(free.tree) else [f"law.{name}" for name in free.names]
 
-    def each(read: Callable[[FitResult], Any]) -> np.ndarray:
+    def each(read: Callable[[FitResult], object]) -> np.ndarray:
         return np.array([read(result) for result in results])
 
     return {

@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._status import Status
-from jaxdamp._tables import Column, Shown, Table, plain, with_unit
+from jaxdamp._tables import Cell, Column, Contents, Shown, Table, plain, with_unit
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, Scheduled, with_fitted_range
 from jaxdamp.identify.dependence import OWN, Dependence
@@ -227,7 +227,7 @@ class ManyFits(AbstractResult):
         columns += [Column("fit", "%", ".1f"), Column("RMSE", "N", ".1f"), Column("remark")]
         rows = []
         for i, name in enumerate(self.names):
-            row: list[Any] = [name, *([self.settings[i]] if self.settings is not None else [])]
+            row: list[Cell] = [name, *([self.settings[i]] if self.settings is not None else [])]
             if self.status[i] is Status.LEFT_OUT:
                 rows.append((*row, *[None] * (2 * len(self.parameters) + 2), self.remarks[i]))
                 continue
@@ -241,7 +241,7 @@ class ManyFits(AbstractResult):
 
     plot = drawn_by("many_fits", "The parameters and errors of all dampers side by side.")
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """The fits as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         names = list(self.parameters)
         units = dict(zip(names, (owner.unit for owner in self.free.owners), strict=True))

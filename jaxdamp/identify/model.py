@@ -2,12 +2,12 @@
 
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple, TypeVar, final
+from typing import NamedTuple, TypeVar, final
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._types import Scalar, State, Vector
@@ -95,7 +95,7 @@ class VehicleTest(Module):
         return readable(self)
 
 
-def fitted_part(model: Any) -> Any:
+def fitted_part(model: PyTree) -> PyTree:
     """What a user asked to be fitted: the law or the vehicle, without machine, sensors and beginnings of records."""
     return model.vehicle if isinstance(model, VehicleTest) else law_of(model)
 

@@ -1,14 +1,14 @@
 """Predicted forces of records, their errors, and the shares of the errors: shape, hysteresis, rest."""
 
 from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from jaxdamp import _checks
-from jaxdamp._tables import with_unit
+from jaxdamp._tables import Contents, with_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import require_finite_force
@@ -126,7 +126,7 @@ class Score(NamedTuple):
     fit_percent: float
     largest_error: float  # N
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Contents:
         """The errors with units, ready for JSON."""
         return {
             "record": self.name,

@@ -26,7 +26,7 @@ class AbstractResiduals(eqx.Module):
     """Measured numbers that a model should explain."""
 
     @abstractmethod
-    def __call__(self, model: Any) -> Float[Array, " samples"]:
+    def __call__(self, model: PyTree) -> Float[Array, " samples"]:
         """Weighted difference between model and measurement; zero for samples that are not used."""
 
     def observed(self, model: PyTree) -> PyTree:
@@ -91,7 +91,7 @@ class Problem(NamedTuple):
     sigma: tuple[float, ...]
     owner: Int[np.ndarray, " samples"]
     reach: Reach
-    law: Any
+    law: PyTree
     per_record: tuple[str, ...]
     each: bool
     sample_steps: tuple[float, ...] = ()
@@ -251,7 +251,7 @@ class _Fixed:
         return hash((len(self.fields["runs"]), *plain))
 
 
-def _same(one: Any, other: Any) -> bool:
+def _same(one: PyTree, other: PyTree) -> bool:
     """Whether records and other fixed values are equal, which a record by itself is only to itself."""
     if one is other:
         return True

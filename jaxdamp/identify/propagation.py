@@ -3,14 +3,14 @@
 import dataclasses
 import functools
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.special
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._jacobian import with_jacobian
@@ -49,7 +49,7 @@ class Evidence(NamedTuple):
     noise: Noise
     covariance: Float[np.ndarray, "free free"]
 
-    def model(self, values: Float[Array, " free"]) -> Any:
+    def model(self, values: Float[Array, " free"]) -> PyTree:
         """The law, vehicle or model with these values, without fitted range; where each record has one, their mean."""
         model = self.problem.free.build(values)
         means = {path: jnp.mean(get(model, path)) for path in self.problem.per_record}
@@ -103,7 +103,7 @@ class Propagated(NamedTuple):
 
 
 def propagate(
-    evidence: Evidence, function: Callable[[Any], Any], samples: int | None = None, seed: int = 0
+    evidence: Evidence, function: Callable[[PyTree], PyTree], samples: int | None = None, seed: int = 0
 ) -> Propagated:
     """`FitResult.propagate`."""
 

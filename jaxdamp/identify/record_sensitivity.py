@@ -8,12 +8,12 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._jacobian import with_jacobian
 from jaxdamp._results import AbstractResult, drawn_by
-from jaxdamp._tables import Column, Table
+from jaxdamp._tables import Column, Contents, Table
 from jaxdamp.identify.estimating import at_ends
 from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.propagation import Evidence
@@ -67,7 +67,7 @@ class RecordSensitivity(AbstractResult):
             "Change of what follows from the fit, for other forces in each record", tuple(columns), tuple(rows)
         )
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """All derivatives as plain data, ready for JSON; numbers that are not finite are None."""
         return self._data(*(field.name for field in dataclasses.fields(self) if field.name != "warnings"))
 
@@ -98,7 +98,7 @@ class _Minimum(NamedTuple):
 
 
 def sensitivity_to_records(
-    evidence: Evidence, function: Callable[[Any], Any], runs: Sequence[Any], criterion: str
+    evidence: Evidence, function: Callable[[PyTree], PyTree], runs: Sequence[Any], criterion: str
 ) -> RecordSensitivity:
     """`FitResult.sensitivity_to_records`.
 
@@ -208,7 +208,7 @@ def _second_order(
 
 
 def _function(
-    evidence: Evidence, function: Callable[[Any], Any], values: np.ndarray
+    evidence: Evidence, function: Callable[[PyTree], PyTree], values: np.ndarray
 ) -> tuple[list[str], np.ndarray, np.ndarray]:
     """Names, values and derivatives of the functions by the free numbers."""
     names: list[str] = []

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, PyTree
 
 from jaxdamp._results import AbstractResult, Derived
 from jaxdamp._status import Status
@@ -69,7 +69,9 @@ class Fit(AbstractModelResult):
         what = f"{len(named)} parameters are" if named else "No parameter is"
         raise KeyError(f"{what} named {name!r}; there are {', '.join(e.name for e in self.parameters)}.")
 
-    def propagate(self, function: Callable[[Any], Any], *, samples: int | None = None, seed: int = 0) -> Propagated:
+    def propagate(
+        self, function: Callable[[PyTree], PyTree], *, samples: int | None = None, seed: int = 0
+    ) -> Propagated:
         """The uncertainty of any function of the fitted law, vehicle or model: a force, a table, a metric of a ride.
 
         Arguments:

@@ -12,7 +12,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
 from jaxdamp._results import AbstractResult, Derived
-from jaxdamp._tables import Column, Table, plain
+from jaxdamp._tables import Column, Contents, Table, plain
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Figure
 from jaxdamp.bench import BenchRun, as_runs, contradictions, usable
@@ -138,7 +138,7 @@ class ScheduledFit(AbstractResult):
         between_settings = "parameters interpolated" if self.choice.blend == "parameters" else "forces blended"
         return Table(f"Fit by setting ({between_settings} between settings)", tuple(columns), tuple(rows))
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """The fits as numbers with units and words, ready for JSON."""
         return {
             "verdict": list(self.verdict),

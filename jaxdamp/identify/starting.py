@@ -56,7 +56,7 @@ def frozen_by(law: Start) -> tuple[str, ...]:
     return law.freeze if isinstance(law, AbstractTrainedStart) else ()
 
 
-def check_start(argument: str, law: Any) -> None:
+def check_start(argument: str, law: object) -> None:
     """Refuse anything that is not a start of a fit."""
     if isinstance(law, AbstractDamper) or (isinstance(law, type) and issubclass(law, AbstractDamper)):
         return

@@ -3,18 +3,18 @@
 import dataclasses
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, TypeAlias, final
+from typing import NamedTuple, TypeAlias, final
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._display import plus_minus
 from jaxdamp._one_thread import one_thread
 from jaxdamp._results import drawn_by
-from jaxdamp._tables import Column, Table, plain
+from jaxdamp._tables import Column, Contents, Table, plain
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import Reach, without_fitted_ranges
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, priors_on, solve_by
@@ -63,7 +63,7 @@ class TargetFit(Fit):
         targets: each target with the value of the model.
     """
 
-    model: Any
+    model: PyTree
     targets: tuple[Met, ...]
 
     def __getitem__(self, name: str) -> float:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -91,7 +91,7 @@ class TargetFit(Fit):
         """Targets, and parameters."""
         return {"targets": self.table(), "parameters": self.parameters_table()}
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """Parameters and targets as plain data."""
         return super().content() | {"targets": [plain(t) | {"met": t.met} for t in self.targets]}
 
@@ -103,13 +103,13 @@ class TargetFit(Fit):
 class TargetResiduals(AbstractResiduals):
     """Deviations from targets in tolerances; zeros behind them, so that there are more than free numbers."""
 
-    numbers: Any
+    numbers: Callable[[PyTree], Mapping[str, PyTree]] | Ride
     wanted: Float[Array, " targets"]
     tolerance: Float[Array, " targets"]
     names: tuple[str, ...] = eqx.field(static=True)
     padding: int = eqx.field(static=True)
 
-    def __call__(self, model: Any) -> Float[Array, " samples"]:
+    def __call__(self, model: PyTree) -> Float[Array, " samples"]:
         """The deviations."""
         reached = self.numbers.of_vehicle(model)({}) if isinstance(self.numbers, Ride) else self.numbers(model)
         values = jnp.stack([jnp.asarray(reached[name], self.wanted.dtype) for name in self.names])
@@ -131,8 +131,8 @@ class TargetResiduals(AbstractResiduals):
 @of_known_numbers
 @one_thread()
 def fit_targets(
-    numbers: Callable[[Any], Mapping[str, Any]] | Ride,
-    start: Any,
+    numbers: Callable[[PyTree], Mapping[str, PyTree]] | Ride,
+    start: PyTree,
     targets: Mapping[str, Goal],
     *,
     over: Sequence[str] | None = None,
@@ -267,7 +267,7 @@ def _goals(targets: Mapping[str, Goal], tolerance: float) -> dict[str, tuple[flo
 
 
 def _free(
-    start: Any,
+    start: PyTree,
     over: Sequence[str] | None,
     freeze: Sequence[str],
     bounds: Mapping[str, tuple[float, float]] | None,
@@ -282,7 +282,7 @@ def _free(
 
 
 def _free_numbers(
-    start: Mapping[str, Any],
+    start: Mapping[str, PyTree],
     over: Sequence[str] | None,
     freeze: Sequence[str],
     bounds: Mapping[str, tuple[float, float]],
@@ -305,7 +305,7 @@ def _free_numbers(
     return FreeParameters(tree, free)
 
 
-def _check_numbers(residuals: TargetResiduals, model: Any) -> None:
+def _check_numbers(residuals: TargetResiduals, model: PyTree) -> None:
     """Whether the function returns the targets."""
     given = residuals.numbers.units if isinstance(residuals.numbers, Ride) else None
     if given is None:

@@ -3,20 +3,19 @@
 import dataclasses
 import functools
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
 from jaxdamp._results import drawn_by
 from jaxdamp._status import Status
-from jaxdamp._tables import Column, Table, with_unit
+from jaxdamp._tables import Column, Contents, Table, with_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.identify.judging import notes_on
@@ -69,7 +68,7 @@ class Training(AbstractFitted):
             rows,
         )
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """Law, errors and the course of the training as plain data."""
         return super().content() | {
             "held_out": [run.name for run in self.held_out],
@@ -242,15 +241,15 @@ def _error(coordinates: Coordinates, raw: Array, residuals: Sequence[AbstractRes
 def _descend(
     coordinates: Coordinates,
     raw: Array,
-    state: Any,
+    state: PyTree,
     residuals: Sequence[AbstractResiduals],
     rule: optax.GradientTransformation,
     level: float,
     count: Array,
-) -> tuple[Array, Any]:
+) -> tuple[Array, PyTree]:
     """So many steps of the optimiser on the mean square relative to the level of the force."""
 
-    def step(_: Any, now: tuple[Array, Any]) -> tuple[Array, Any]:
+    def step(_: Array, now: tuple[Array, PyTree]) -> tuple[Array, PyTree]:
         raw, state = now
         slope = jax.grad(lambda raw: _mean_square(coordinates, raw, residuals) / level**2)(raw)
         with jax.numpy_dtype_promotion("standard"):  # optax mixes its integer count with floats

@@ -106,7 +106,7 @@ class VehicleData(NamedTuple):
         return noise | dict(self.known)
 
 
-def checked_records(vehicle: AbstractVehicle, records: Any) -> tuple[RideRecord, ...]:
+def checked_records(vehicle: AbstractVehicle, records: RideRecord | Iterable[RideRecord]) -> tuple[RideRecord, ...]:
     """The records, after a check that the vehicle has their channels and wheels."""
     refuse_controller(vehicle, "a fit")
     rides = tuple(records) if isinstance(records, Iterable) else (records,)
