@@ -2,10 +2,11 @@
 
 import re
 from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxdamp.codegen import C, PrintedFunction, Program
 from jaxdamp.export._law_program import LawNumber, LawProgram
@@ -110,7 +111,7 @@ def comment(text: str) -> str:
 
 
 def _definition(function: CFunction) -> str:
-    results: Any = function.program.results
+    results: PyTree = function.program.results
     arguments, outputs, returned = re.findall(r"(\w+)[,)]", function.head), [], None
     if function.targets:
         parts = [results] if len(function.targets) == 1 else results

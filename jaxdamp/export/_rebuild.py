@@ -4,12 +4,12 @@ import dataclasses
 import inspect
 import json
 import sys
-from typing import Any
 
 import equinox as eqx
 import jax
 import numpy as np
 from jax.tree_util import Partial
+from jaxtyping import PyTree
 
 from jaxdamp import _checks
 from jaxdamp._tables import Contents
@@ -80,7 +80,7 @@ def plain_module(module: eqx.Module) -> Contents:
     return result
 
 
-def _plain(value: object, where: str) -> Any:
+def _plain(value: object, where: str) -> object:
     if isinstance(value, eqx.Module) and not isinstance(value, Partial):
         return plain_module(value)
     if type(value) is tuple:
@@ -125,7 +125,7 @@ def _known_number(value: object, where: str) -> np.ndarray:
     return numbers
 
 
-def rebuilt(plain: object, where: str) -> Any:
+def rebuilt(plain: object, where: str) -> PyTree:
     """The module that `plain_module` wrote, unchecked.
 
     Raises:
@@ -145,12 +145,12 @@ def rebuilt(plain: object, where: str) -> Any:
     return _filled(object.__new__(kind), given, notes)
 
 
-def _filled(module: Any, given: Contents, notes: Contents) -> Any:
+def _filled(module: PyTree, given: Contents, notes: Contents) -> PyTree:
     """An empty module with the values of a file; fields that it does not give have their default."""
     name, fields = type(module).__name__, own_fields(type(module))
     for field in fields:
         here, number = f"{name}.{field.name}", declared(field)
-        value: Any = field.default
+        value: PyTree = field.default
         if field.name in given:
             plain = given[field.name]
             value = _value(plain, here) if number is None else _number(plain, number["unit"], here)
@@ -209,7 +209,7 @@ def _errors(plain: object, owner: str) -> list[StandardError]:
     return errors
 
 
-def _value(plain: object, where: str) -> Any:
+def _value(plain: object, where: str) -> object:
     if isinstance(plain, list):
         return tuple(_value(item, f"{where}[{i}]") for i, item in enumerate(plain))
     if not isinstance(plain, dict):

@@ -7,10 +7,10 @@ import os
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 import jax
 import numpy as np
+from jaxtyping import Array
 
 from jaxdamp import _checks
 from jaxdamp._display import COMPRESSION, Display, display
@@ -19,11 +19,12 @@ from jaxdamp._tables import Contents
 from jaxdamp._words import class_words, first_upper, in_words, metric_words
 from jaxdamp._writing import write_whole
 from jaxdamp.bench import BenchRun
-from jaxdamp.codegen import JavaScript, PrintedFunction, Program, lower, symbols
+from jaxdamp.codegen import Atom, JavaScript, PrintedFunction, Program, lower, symbols
 from jaxdamp.dampers import AbstractDamper, law_name
 from jaxdamp.export._law_program import LawNumber, LawProgram
 from jaxdamp.export._ride_program import RideProgram
 from jaxdamp.export.module_file import to_json
+from jaxdamp.metrics import Metric
 from jaxdamp.parameters import weight
 from jaxdamp.roads import AbstractRoad, cosine_bump, iso8608
 from jaxdamp.simulation import Ride, axle_timing
@@ -59,7 +60,7 @@ def vehicle_functions(vehicle: RideProgram) -> dict[str, str]:
 def bump_function() -> str:
     """`bump(t, height, length, speed)`: the height of a cosine bump that begins at 1 s."""
 
-    def bump(t: Any, height: Any, length: Any, speed: Any) -> Any:
+    def bump(t: Array, height: Array, length: Array, speed: Array) -> Array:
         return cosine_bump(height, start=1.0, length=length, speed=speed).height(t[None])[0, 0]
 
     names = ("t", "height", "length", "speed")
@@ -80,7 +81,7 @@ def _filled(head: str, program: Program, target: str) -> str:
     return _function(head, program, [(f"{target}[{k}]", value) for k, value in enumerate(values)], None)
 
 
-def _function(head: str, program: Program, outputs: Sequence[Any], returned: Any) -> str:
+def _function(head: str, program: Program, outputs: Sequence[tuple[str, Atom]], returned: Atom | None) -> str:
     return _LANGUAGE.function(PrintedFunction(f"function {head}", (), program.statements, outputs, returned))
 
 
@@ -302,7 +303,7 @@ def _range(number: LawNumber, value: float, largest: float) -> tuple[float, floa
     return max(value - 2.0 * size, domain.lower), min(value + 2.0 * size, domain.upper)
 
 
-def _of_metric(metric: Any, vehicle: AbstractVehicle) -> Contents:
+def _of_metric(metric: Metric, vehicle: AbstractVehicle) -> Contents:
     title = metric_words(metric.name) + (f", {metric.weighting}" if metric.weighting else "")
     unit, main = metric.unit(vehicle.units), bool(_MAIN.match(metric.name))
     return {"name": metric.name, "title": title, "unit": unit, "main": main, "signed": metric.statistic.signed}

@@ -3,9 +3,10 @@
 import json
 import os
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import equinox as eqx
+from jaxtyping import PyTree
 
 from jaxdamp import _checks
 from jaxdamp._documents import parse_json, read_text
@@ -67,7 +68,7 @@ def to_json(module: eqx.Module, path: str | os.PathLike[str] | None = None) -> s
     return text.rstrip("\n")
 
 
-def from_json(path_or_text: str | os.PathLike[str]) -> Any:
+def from_json(path_or_text: str | os.PathLike[str]) -> PyTree:
     """Read what `to_json` wrote.
 
     Your own classes are identified by name; import the module that defines them first. Values are checked as by the
@@ -96,7 +97,7 @@ def from_json(path_or_text: str | os.PathLike[str]) -> Any:
             raise FileNotFoundError(f"There is no file {str(file)!r} (text would have to begin with '{{').")
         source, text = str(file), read_text(file, "JSON")
     try:
-        document = parse_json(text, parse_constant=_no_constant)
+        document = parse_json(text, _no_constant)
     except ValueError as error:
         raise ValueError(f"It must be written in JSON, but {source} is not: {error}.") from error
     kind = FORMATS.get(str(document.get("format"))) if isinstance(document, dict) else None
