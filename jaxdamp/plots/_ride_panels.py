@@ -12,7 +12,7 @@ from jaxdamp.plots import _axes, _rides, _sheet, _style, fitted_range
 from jaxdamp.plots._sketch import sketch
 from jaxdamp.plots.damping import ratios, wheel_axis
 from jaxdamp.rig import quasi_static
-from jaxdamp.roads import assess_roughness, class_limits, road_class
+from jaxdamp.roads import WhiteRoad, assess_roughness, class_limits, road_class
 
 
 _MM, _BINS, _MOST_BARS = 1e3, 31, 6
@@ -40,6 +40,7 @@ def road(axes: Axes, shown: _rides.Rides) -> None:
         return
     speed = 1.0 if speed is None else speed
     if shown.responses is None or heights is None:
+        assert isinstance(shown.road, WhiteRoad)
         roughness = float(shown.road.velocity_psd) / (2.0 * np.pi) ** 2 / speed / 0.1**2
         axes.loglog(n, roughness * (n / 0.1) ** -2.0, **_style.AFTER)
         name = road_class(roughness)

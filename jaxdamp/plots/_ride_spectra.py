@@ -60,6 +60,7 @@ def _gains(shown: _rides.Rides, number: int, channels: Sequence[str]) -> dict[st
         by_channel = {name: _driven(response, np.asarray(response[name])) for name in channels}
     else:
         road, frequency = shown.road, np.geomspace(LOWEST, HIGHEST, 200)
+        assert isinstance(road, WhiteRoad)
         linear = linearise(car, velocity_psd=road.velocity_psd, speed=road.speed)
         found = frequency_response(linear, frequency, speed=road.speed)
         by_channel = {name: (frequency, np.abs(np.asarray(found[name]))) for name in channels}

@@ -5,7 +5,6 @@ import functools
 import warnings
 from collections.abc import Mapping, Sequence
 from statistics import NormalDist
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -18,9 +17,9 @@ from jaxdamp.dampers import AbstractDamper, Linear, takes_command, without_fitte
 from jaxdamp.parameters import get
 from jaxdamp.plots import _style
 from jaxdamp.rig import quasi_static
-from jaxdamp.roads import WhiteRoad, from_profile
+from jaxdamp.roads import AbstractRoad, WhiteRoad, from_profile
 from jaxdamp.simulation import Response, Ride, simulate
-from jaxdamp.tune import Rescore, TuneResult, damper_paths, limit_spans
+from jaxdamp.tune import Limits, Rescore, Run, TuneResult, damper_paths, limit_spans
 from jaxdamp.vehicles import AbstractVehicle, CriticalDamping, critical_damping, equivalent_dampers, modes
 
 
@@ -38,8 +37,8 @@ class Rides:
     names: tuple[str, str]
     cars: tuple[AbstractVehicle, AbstractVehicle]
     responses: tuple[Response, Response] | None  # None on a white road
-    road: Any
-    run: Mapping[str, Any]
+    road: AbstractRoad | WhiteRoad | None
+    run: Run
     values: tuple[Mapping[str, float], Mapping[str, float]]
     units: Mapping[str, str]
     limits: Mapping[str, tuple[float, float]]
@@ -50,7 +49,7 @@ class Rides:
     def of_tuning(cls, result: TuneResult) -> "Rides":
         """A tuning, driven again on its road, as long as that is known."""
         drive, cars = result.drive, (result.start, result.vehicle)
-        road, run = (None, {}) if drive is None else (drive.road, drive.run)
+        road, run = (None, Run()) if drive is None else (drive.road, drive.run)
         responses = None
         if road is not None and not isinstance(road, WhiteRoad):
             with warnings.catch_warnings():
@@ -62,7 +61,7 @@ class Rides:
         return cls(("before", "after"), cars, responses, road, run, sides, result.units, limits, result.fresh, result)
 
     @classmethod
-    def of_responses(cls, rides: Mapping[str, Response], limits: Mapping[str, object] | None) -> "Rides":
+    def of_responses(cls, rides: Mapping[str, Response], limits: Limits | None) -> "Rides":
         """Rides on one road, which is not level, the first against the last."""
         first, last = next(iter(rides)), list(rides)[-1]
         pair = (rides[first], rides[last])
@@ -75,7 +74,7 @@ class Rides:
         time = np.asarray(pair[0].time)
         dt = float(f"{(time[-1] - time[0]) / (len(time) - 1):.6g}")  # single precision has no more digits
         road = from_profile(dt * np.arange(len(time)), np.asarray(pair[0].road))
-        run = {"duration": dt * (len(time) - 1), "dt": dt}
+        run = Run(duration=dt * (len(time) - 1), dt=dt)
         units = pair[0].metric_units()
         spans = limit_spans(limits, list(sides[0]))
         cars = (pair[0].vehicle, pair[1].vehicle)
@@ -144,6 +143,7 @@ class Rides:
 
 def constant_damping(shown: Rides, comfort: Sequence[str], grip: Sequence[str]) -> tuple[np.ndarray, np.ndarray] | str:
     """The mean metrics of comfort and grip with linear dampers from soft to firm; or why they cannot be driven."""
+    assert shown.road is not None
     car = without_fitted_ranges(shown.passive[0])
     paths = damper_paths(car)
     rates = {path: _slope(get(car, path)) for path in paths}
@@ -151,7 +151,7 @@ def constant_damping(shown: Rides, comfort: Sequence[str], grip: Sequence[str]) 
         linear = eqx.tree_at(lambda c: [get(c, path) for path in paths], car, [Linear(rates[path]) for path in paths])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            ride = Ride(linear, shown.road, metrics=[*comfort, *grip], **({} if shown.white else shown.run))
+            ride = Ride(linear, shown.road, metrics=[*comfort, *grip], **(Run() if shown.white else shown.run))
             drive = jax.jit(jax.vmap(lambda f: ride({f"{path}.rate": f * rate for path, rate in rates.items()})))
             driven = {name: np.asarray(values) for name, values in drive(jnp.asarray(FACTORS)).items()}
     except ValueError as error:
@@ -159,7 +159,7 @@ def constant_damping(shown: Rides, comfort: Sequence[str], grip: Sequence[str]) 
     return np.mean([driven[name] for name in comfort], axis=0), np.mean([driven[name] for name in grip], axis=0)
 
 
-def _slope(law: Any) -> float:
+def _slope(law: AbstractDamper) -> float:
     """The damping of a law between ± 0.2 m/s [N s/m]."""
     force = np.asarray(quasi_static(law, np.array([-0.2, 0.2])).force)
     return max(float(force[1] - force[0]) / 0.4, 50.0)

@@ -4,7 +4,6 @@ import re
 import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
 
 from jaxdamp._display import display
 from jaxdamp._types import Axes, Figure
@@ -28,9 +27,12 @@ def lettering() -> Iterator[None]:
     """Letters of a printed page while a sheet is drawn."""
     from matplotlib import rc_context
 
-    sizes: dict[Any, Any] = {"font.size": 8.5, "legend.fontsize": 7.5, "figure.titlesize": 8.5}
-    sizes |= {"axes.titlesize": 8.5, "axes.labelsize": 8.0, "xtick.labelsize": 7.5, "ytick.labelsize": 7.5}
-    with rc_context(sizes):
+    with rc_context(
+        {
+            **{"font.size": 8.5, "legend.fontsize": 7.5, "figure.titlesize": 8.5},
+            **{"axes.titlesize": 8.5, "axes.labelsize": 8.0, "xtick.labelsize": 7.5, "ytick.labelsize": 7.5},
+        }
+    ):
         yield
 
 

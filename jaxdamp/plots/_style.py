@@ -3,14 +3,14 @@
 import textwrap
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._display import display
 from jaxdamp._tables import typeset_unit
-from jaxdamp._types import Axes, Figure
+from jaxdamp._types import Artist, Axes, Figure
 from jaxdamp._words import (
     class_words as class_words,
     first_upper as first_upper,
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     import matplotlib.text
 
 
+T = TypeVar("T")
 Look = dict[str, Any]  # keywords of a line, patch or text
 # Every two of these, and black, differ for each kind of colour vision, and all stand out 3:1 from white paper.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#9933FF", "#663300", "#001A99")
@@ -49,7 +50,7 @@ BEST: Look = {"marker": "*", "color": COLOURS[0], "markersize": 14.0}
 LIMIT: Look = {"color": BAD, "linestyle": "--", "linewidth": 1.2}
 REBOUND, COMPRESSION = COLOURS[0], COLOURS[1]  # where both are on one axis
 FRONT, REAR = "-", "-."
-ROLES: Mapping[str, Mapping[str, Any]] = MappingProxyType(
+ROLES: Mapping[str, Look] = MappingProxyType(
     {
         "measured": MEASURED,
         "before": BEFORE,
@@ -61,7 +62,7 @@ ROLES: Mapping[str, Mapping[str, Any]] = MappingProxyType(
 )
 """What a line of your own figure is drawn with: `axes.plot(x, y, **plots.ROLES["after"])`. "shade" is for what is
 extrapolated, or a range that is allowed."""
-STYLE: Mapping[str, Any] = MappingProxyType(
+STYLE: Mapping[str, object] = MappingProxyType(
     {
         "figure.constrained_layout.use": True,
         "axes.prop_cycle": f"cycler('color', {list(COLOURS)})",
@@ -218,7 +219,7 @@ def cross(axes: Axes, horizontal: bool = True, vertical: bool = True) -> None:
 
 def legend_beside(
     figure: Figure,
-    handles: Sequence[object],
+    handles: Sequence[Artist],
     title: str = "",
     place: Literal["upper", "lower"] = "upper",
 ) -> None:
@@ -231,7 +232,7 @@ def legend_beside(
 _LETTERS = 9  # in an inch of a legend, with room for narrower figures
 
 
-def legend_above(figure: Figure, handles: Sequence[Any], columns: int = 3) -> None:
+def legend_above(figure: Figure, handles: Sequence[Artist], columns: int = 3) -> None:
     """A legend above all axes, for pictures that need their width."""
     _in_words(handles)
     letters = max((len(line) for handle in handles for line in str(handle.get_label()).split("\n")), default=1)
@@ -240,13 +241,15 @@ def legend_above(figure: Figure, handles: Sequence[Any], columns: int = 3) -> No
     figure.legend(handles=list(handles), loc="outside upper center", frameon=False, ncols=columns)
 
 
-def _in_words(handles: Sequence[Any]) -> None:
+def _in_words(handles: Sequence[Artist]) -> None:
     """The labels of a legend in the units that are shown."""
     for handle in handles:
         handle.set_label(display().words(str(handle.get_label())))
 
 
-def by_name(argument: str, given: object, kind: type, words: str, remedy: str, alone: str = "") -> Look:
+def by_name(
+    argument: str, given: T | Mapping[str, T], kind: type[T], words: str, remedy: str, alone: str = ""
+) -> dict[str, T]:
     """One object to draw, or several by name, as a dictionary; `alone` names a single one.
 
     Arguments:

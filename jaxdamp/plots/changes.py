@@ -1,6 +1,6 @@
 """A tuning: laws and spectra before and after, and the change of every ride metric."""
 
-from typing import Any
+from collections.abc import Sequence
 
 import equinox as eqx
 import numpy as np
@@ -103,13 +103,13 @@ def _bars(axes: Axes, result: TuneResult) -> None:
     _style.cross(axes, horizontal=False)
 
 
-def _spectrum(axes: Axes, channel: str, unit: str, pair: tuple[Any, Any]) -> None:
+def _spectrum(axes: Axes, channel: str, unit: str, pair: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
     """The power spectral density of a channel before and after."""
-    for spectrum, style, label in zip(pair, (_style.BEFORE, _style.AFTER), ("before", "after"), strict=True):
-        axes.loglog(spectrum.frequency, spectrum.density, label=label, **style)
+    for side, style, label in zip(pair, (_style.BEFORE, _style.AFTER), ("before", "after"), strict=True):
+        axes.loglog(*side, label=label, **style)
     title = f"Spectrum of the {_style.metric_words(channel)}"
     squared = f"({typeset_unit(unit)})²" if "/" in unit else f"{unit}²"
     _style.dress(axes, "frequency [Hz]", f"[{squared}/Hz]", title)
     _style.plain_log_axis(axes.xaxis)
-    axes.set_xlim(pair[0].frequency[0], pair[0].frequency[-1])
+    axes.set_xlim(*pair[0][0][[0, -1]])
     axes.legend(frameon=False)

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -158,7 +157,7 @@ def _with_uncertainty(measurement: Measurement) -> str:
     return " ± ".join(rounded(measurement.value, measurement.uncertainty)).replace("-", "−")
 
 
-def _colours(evaluation: Evaluation) -> tuple[_style.Look, list[tuple[str, Any]]]:
+def _colours(evaluation: Evaluation) -> tuple[_style.Look, list[tuple[str, tuple[float, float, float, float]]]]:
     """The colour of each record, and the entries of the legend."""
     if len(evaluation.settings) > 1:
         names = list(evaluation.settings)
@@ -171,7 +170,7 @@ def _colours(evaluation: Evaluation) -> tuple[_style.Look, list[tuple[str, Any]]
     return colours, [(f"{run.name} ({run.peak_velocity:.2g} m/s)", colours[run.name]) for run in shown]
 
 
-def _draw_cycle(panels: Mapping[str, Axes], cycles: FoldedCycles, style: Mapping[str, Any]) -> None:
+def _draw_cycle(panels: Mapping[str, Axes], cycles: FoldedCycles, style: _style.Look) -> None:
     """The mean cycle of a record, closed, in a band of one standard deviation of the force over its cycles."""
     stroke, velocity, force = (
         _closed(values.mean(axis=0)) for values in (cycles.stroke, cycles.velocity, cycles.force)
@@ -197,7 +196,7 @@ def _closed(values: Float[np.ndarray, " points"]) -> Float[np.ndarray, " more"]:
     return np.append(values, values[0])
 
 
-def _draw_forces(axes: Axes, evaluation: Evaluation, styles: Mapping[str, Mapping[str, Any]]) -> list:
+def _draw_forces(axes: Axes, evaluation: Evaluation, styles: Mapping[str, _style.Look]) -> list:
     """Forces at peak velocity of each setting, and those at stated velocities.
 
     Lines join the peaks of a setting whose velocities differ clearly; repeats of one velocity stand beside each other.

@@ -1,9 +1,9 @@
 """Natural modes; over frequency, vehicles on a sine of their road, laws on the test machine, and what is felt."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
+from jaxtyping import Array
 
 from jaxdamp import metrics
 from jaxdamp._steady_cycles import AbstractSteadyCycles
@@ -77,7 +77,10 @@ def dynamic_stiffness(result: DynamicStiffness) -> Figure:
 
 
 def _over_frequency(
-    result: AbstractSteadyCycles, amplitude: Any, panels: Sequence[tuple[str, str, np.ndarray]], legend: str
+    result: AbstractSteadyCycles,
+    amplitude: Array,
+    panels: Sequence[tuple[str, str, np.ndarray]],
+    legend: str,
 ) -> Figure:
     """A panel for each title, label and values, with a curve for each amplitude."""
     frequency = np.asarray(result.frequency)

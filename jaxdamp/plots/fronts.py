@@ -1,13 +1,12 @@
 """A front of ride metrics, with the damper laws along it."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._tables import typeset_unit
-from jaxdamp._types import Axes, Figure, VectorLike
+from jaxdamp._types import Artist, Axes, Figure, VectorLike
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.plots import _style
 from jaxdamp.plots.changes import own_laws
@@ -58,7 +57,7 @@ def pareto(
     return figure
 
 
-def _points(axes: Axes, front: ParetoFront, x: str, y: str, marked: Mapping[str, Mapping[str, float]]) -> list[Any]:
+def _points(axes: Axes, front: ParetoFront, x: str, y: str, marked: Mapping[str, Mapping[str, float]]) -> list[Artist]:
     """One pair of objectives: the points of the front, its knee, and vehicles to compare with."""
     across, up, shades = front.values[x], front.values[y], front.shares[:, 0]
     if len(front.names) == 2:
@@ -78,7 +77,7 @@ def _points(axes: Axes, front: ParetoFront, x: str, y: str, marked: Mapping[str,
     return handles
 
 
-def _limits(axes: Axes, front: ParetoFront, x: str, y: str) -> list[Any]:
+def _limits(axes: Axes, front: ParetoFront, x: str, y: str) -> list[Artist]:
     """Dashed lines at the limits of the two objectives, and marks at points where another metric is at its limit."""
     colour, handles = _style.BAD, []
     for name, (lower, upper) in limit_spans(front.limits, list(front.values)).items():

@@ -9,7 +9,7 @@ from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Figure
 from jaxdamp.plots import _ride_panels, _ride_spectra, _rides, _sheet, _style
 from jaxdamp.simulation import Response
-from jaxdamp.tune import TuneResult
+from jaxdamp.tune import Limits, TuneResult
 
 
 @of_known_numbers
@@ -18,7 +18,7 @@ def ride_sheet(
     *,
     sentence: str = "",
     name: str = "",
-    limits: Mapping[str, object] | None = None,
+    limits: Limits | None = None,
 ) -> Figure:
     """One A4 page of a ride or a tuning, to print or to send: `result.plot("sheet")`.
 

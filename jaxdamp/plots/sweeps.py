@@ -1,15 +1,15 @@
 """A metric over the points of a sweep: curves, or a map."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._tables import typeset_unit
-from jaxdamp._types import Axes, Dataset, Figure
+from jaxdamp._types import Artist, Axes, Dataset, Figure
 from jaxdamp.plots import _axes, _style
-from jaxdamp.tune import limit_spans
+from jaxdamp.tune import Limits, limit_spans
 
 
 LEVELS = 14  # of a map
@@ -26,7 +26,7 @@ def sweep(
     over: Sequence[str] | None = None,
     *,
     against: str | None = None,
-    limits: Mapping[str, object] | None = None,
+    limits: Limits | None = None,
     present: Mapping[str, object] | None = None,
 ) -> Figure:
     """A result of a sweep over a grid: a curve for one axis, a map for two; failed points are marked.
@@ -277,7 +277,7 @@ class _End(NamedTuple):
         return values > self.value if self.above else values < self.value
 
 
-def _ends(data: object, spans: Mapping[str, tuple[float, float]]) -> list[_End]:
+def _ends(data: Dataset, spans: Mapping[str, tuple[float, float]]) -> list[_End]:
     """The finite ends of limits, in words."""
     ends = []
     for name, span in spans.items():
@@ -289,7 +289,7 @@ def _ends(data: object, spans: Mapping[str, tuple[float, float]]) -> list[_End]:
     return ends
 
 
-def _hatch(plot: Axes, x: np.ndarray, y: np.ndarray, values: np.ndarray, end: _End, number: int) -> Any:
+def _hatch(plot: Axes, x: np.ndarray, y: np.ndarray, values: np.ndarray, end: _End, number: int) -> Artist:
     """Hatch a map where a limit is violated, with the boundary drawn; the handle for the legend."""
     from matplotlib.patches import Patch
 
@@ -304,20 +304,20 @@ def _hatch(plot: Axes, x: np.ndarray, y: np.ndarray, values: np.ndarray, end: _E
     return Patch(facecolor="none", edgecolor=colour, hatch=hatch, label=end.label)
 
 
-def _label(data: Any, name: str) -> str:
+def _label(data: Dataset, name: str) -> str:
     """A name in words with its unit."""
     words = _words(data, name)
     unit = typeset_unit(data[name].attrs.get("units", ""))
     return f"{words} [{unit}]" if unit else words
 
 
-def _words(data: Any, name: str) -> str:
+def _words(data: Dataset, name: str) -> str:
     """The last part of a name in words; the whole path if another axis has the same last part."""
     last = name.rpartition(".")[2]
     alike = [axis for axis in map(str, data.coords) if axis.rpartition(".")[2] == last and axis != name]
     return _style.metric_words(name if alike else last)
 
 
-def _unit(data: Any, name: str) -> str:
+def _unit(data: Dataset, name: str) -> str:
     unit = typeset_unit(data[name].attrs.get("units", ""))
     return f" {unit}" if unit else ""

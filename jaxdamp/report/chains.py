@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from jaxdamp import plots
 from jaxdamp.bench import BenchRun, Evaluation, Preflight
@@ -22,7 +21,7 @@ from jaxdamp.tune import TuneResult
 def chain_report(
     comparison: Comparison,
     rides: Mapping[str, Mapping[str, Response]],
-    tuned: TuneResult[Any] | None = None,
+    tuned: TuneResult | None = None,
     *,
     title: str = "From bench records to a better damper",
     sentences: Sequence[str] = (),

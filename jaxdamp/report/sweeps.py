@@ -3,15 +3,14 @@
 import functools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from jaxdamp import plots
 from jaxdamp._tables import percent_change, typeset_unit
-from jaxdamp._types import DataArray, Dataset
+from jaxdamp._types import DataArray, Dataset, ScalarLike
 from jaxdamp._words import path_words
 from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.page import Report
-from jaxdamp.tune import limit_spans
+from jaxdamp.tune import Limits, limit_spans
 
 
 MOST_AXES = 2  # of a grid that is drawn
@@ -23,8 +22,8 @@ def sweep_report(
     *,
     title: str = "Sweep",
     remarks: Sequence[str] = (),
-    limits: Mapping[str, object] | None = None,
-    baseline: Mapping[str, object] | None = None,
+    limits: Limits | None = None,
+    baseline: Mapping[str, ScalarLike] | None = None,
     present: Mapping[str, object] | None = None,
     plane: tuple[str, str] | None = None,
     folder: Path | None = None,
@@ -67,7 +66,7 @@ def sweep_report(
 
 
 def best_points(
-    data: Dataset, limits: Mapping[str, object] | None = None, baseline: Mapping[str, object] | None = None
+    data: Dataset, limits: Limits | None = None, baseline: Mapping[str, ScalarLike] | None = None
 ) -> list[str]:
     """The smallest value of each result in a sentence, where it is, within the limits, and beside a baseline.
 
@@ -103,7 +102,7 @@ def _smallest(
     name: str,
     axes: Sequence[str],
     allowed: DataArray,
-    baseline: Mapping[str, Any] | None,
+    baseline: Mapping[str, ScalarLike] | None,
 ) -> str:
     """The smallest value of a result, where it is, and its change from the baseline."""
     values = data[name].where(allowed)
@@ -118,5 +117,5 @@ def _smallest(
     return f"Smallest {path_words(name)}: {_in_words(data, name, values.min())} at {where}.{widen}"
 
 
-def _in_words(data: Dataset, name: str, value: Any) -> str:
+def _in_words(data: Dataset, name: str, value: ScalarLike | DataArray) -> str:
     return f"{float(value):.4g} {typeset_unit(data[name].attrs.get('units', ''))}".rstrip()

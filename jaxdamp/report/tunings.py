@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import equinox as eqx
 import numpy as np
@@ -21,7 +20,7 @@ MOST_COMBINATIONS = 100  # rows of choices on a page, the best first
 
 
 def tuning_report(
-    result: TuneResult[Any],
+    result: TuneResult,
     *,
     title: str = "Tuning",
     rescored: Rescore | None = None,
@@ -60,7 +59,7 @@ def tuning_report(
 
 
 def add_tuning(
-    report: Report, result: TuneResult[Any], rescored: Rescore | None = None, *, outcome: str = "", elsewhere: str = ""
+    report: Report, result: TuneResult, rescored: Rescore | None = None, *, outcome: str = "", elsewhere: str = ""
 ) -> None:
     """The section of a page on a tuning.
 
@@ -86,7 +85,7 @@ def add_tuning(
     report.picture(lambda: plots.tuning(result), "Before and after the tuning", "tuning.png")
 
 
-def add_baseline(report: Report, result: TuneResult[Any], baseline: AbstractVehicle) -> None:
+def add_baseline(report: Report, result: TuneResult, baseline: AbstractVehicle) -> None:
     """The section of a page on a tuning beside another vehicle: ride metrics on the same road, and damper curves.
 
     Arguments:
@@ -113,7 +112,7 @@ def add_baseline(report: Report, result: TuneResult[Any], baseline: AbstractVehi
             )
 
 
-def _beside(result: TuneResult[Any], baseline: AbstractVehicle) -> Table:
+def _beside(result: TuneResult, baseline: AbstractVehicle) -> Table:
     """Ride metrics of the baseline, before and after, on the road of the tuning."""
     assert result.drive is not None
     road, run = result.drive
