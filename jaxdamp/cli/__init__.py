@@ -2,7 +2,7 @@
 
 import gc
 import signal
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from jaxdamp.cli import interrupt, streams
 
@@ -24,7 +24,7 @@ def main() -> None:
         app(prog_name="jaxdamp")
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """The application is loaded when it is first used, so that `main` comes before all other imports."""
     if name == "app":
         from jaxdamp.cli.application import app

@@ -5,10 +5,14 @@ import inspect
 import itertools
 import shlex
 from importlib import import_module
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from typer.core import TyperCommand, TyperGroup
+
+
+if TYPE_CHECKING:
+    from typer._click import Command as AnyCommand, Context
 
 
 COMMANDS = {  # along the chain from records to a damper: name and function
@@ -36,7 +40,7 @@ class Command(TyperCommand):
 
     aliases: dict[str, str]
 
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+    def parse_args(self, ctx: "Context", args: list[str]) -> list[str]:
         """Read the words after the name of the command."""
         names = {option for parameter in self.params for option in parameter.opts}
         replaced = []
@@ -54,21 +58,21 @@ class Command(TyperCommand):
 class Commands(TyperGroup):
     """All commands; keeps the words typed, for the last lines of a page and for messages."""
 
-    def list_commands(self, ctx: Any) -> list[str]:
+    def list_commands(self, ctx: object) -> list[str]:
         """The names in the order of the help."""
         return list(COMMANDS)
 
-    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+    def get_command(self, ctx: object, cmd_name: str) -> Command | None:
         """The command of a name."""
         return command(cmd_name) if cmd_name in COMMANDS else None
 
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+    def parse_args(self, ctx: "Context", args: list[str]) -> list[str]:
         """Read the words after the name of the program."""
         _typed[:] = [shlex.join(["jaxdamp", *args])]
         ctx.call_on_close(_typed.clear)
         return super().parse_args(ctx, args)
 
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+    def resolve_command(self, ctx: "Context", args: list[str]) -> tuple[str | None, "AnyCommand | None", list[str]]:
         """The command of the first word."""
         name, chosen, rest = super().resolve_command(ctx, args)
         if chosen is not None:
@@ -137,7 +141,7 @@ def command(name: str) -> Command:
 
     target = COMMANDS[name]
 
-    def run(*, debug: bool = False, **given: Any) -> None:
+    def run(*, debug: bool = False, **given: object) -> None:
         from jaxdamp.cli import console, early, resuming, showing
 
         with console.plain_errors(debug):

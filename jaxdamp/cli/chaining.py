@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from jaxdamp import _checks, simulate
 from jaxdamp._display import display
@@ -20,6 +20,7 @@ from jaxdamp.parameters import parameters
 from jaxdamp.report import chain_report, records_table
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import Response
+from jaxdamp.tune import Run
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -52,6 +53,7 @@ def report(
     if road.startswith("white"):
         _checks.refuse("road", "be one to ride on", repr(road), "Take iso:CLASS.")
     (surface,), run = driving.over(road)
+    assert isinstance(surface, AbstractRoad)
     screen.points(unusual(road, driving.speed), style="yellow")
     with job(screen, "report", output, resume=resume) as work:
         with screen.stage("Reading the records"):
@@ -102,7 +104,7 @@ def _nothing_to_tune(law: AbstractDamper, search: Call) -> bool:
 
 
 def driven(
-    screen: Screen, cars: Mapping[str, AbstractVehicle], road: AbstractRoad, run: Mapping[str, Any], title: str
+    screen: Screen, cars: Mapping[str, AbstractVehicle], road: AbstractRoad, run: Run, title: str
 ) -> dict[str, Response]:
     """Each vehicle on the road."""
     rides: dict[str, Response] = {}

@@ -1,15 +1,16 @@
 """What can be told from the words and the files alone, before JAX is loaded: a mistyped path is answered at once."""
 
 import glob
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from jaxdamp import _checks
 from jaxdamp._documents import parse_json, read_text, read_toml
 from jaxdamp._files import FOLDER_SUFFIXES, find_files
+from jaxdamp._tables import Contents
 from jaxdamp.cli import resuming
 from jaxdamp.cli.results import refuse_target
+from jaxdamp.cli.signatures import Arguments
 
 
 FROM_FIT = "`jaxdamp fit` writes best_law.json from records."
@@ -19,7 +20,7 @@ FROM_LIST = 'Or give a name, see "jaxdamp vehicles".'
 ROADS = ("iso", "white", "bump")
 
 
-def check(command: str, given: Mapping[str, Any]) -> None:
+def check(command: str, given: Arguments) -> None:
     """Refuse paths that lead nowhere, files that are not JSON, and a folder that may not be written.
 
     Arguments:
@@ -74,7 +75,7 @@ def require_file(argument: str, path: Path, remedy: str = "") -> None:
         )
 
 
-def read_vehicle(path: Path) -> dict[str, Any]:
+def read_vehicle(path: Path) -> Contents:
     """What the TOML file of a vehicle says."""
     require_file("vehicle", path, FROM_LIST)
     try:

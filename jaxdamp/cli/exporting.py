@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -17,8 +17,12 @@ from jaxdamp.dampers import AbstractDamper
 from jaxdamp.vehicles import AbstractVehicle
 
 
-PROGRAMS: dict[str, tuple[str, Callable[..., Any]]] = {"c": (".c", export.to_c), "fmu": (".fmu", export.to_fmu)}
-TABLES: dict[str, tuple[str, Callable[..., Any]]] = {
+Write = Callable[..., Path | list[Path]]  # a file, or several
+PROGRAMS: dict[str, tuple[str, Write]] = {
+    "c": (".c", export.to_c),
+    "fmu": (".fmu", export.to_fmu),
+}
+TABLES: dict[str, tuple[str, Write]] = {
     "adams": (".dpr", export.to_adams),
     "assetto-corsa": (".ini", export.to_assetto_corsa),
     "carsim": (".par", export.to_carsim),

@@ -14,6 +14,7 @@ from jaxdamp.cli.limits import bounds_in_si
 from jaxdamp.cli.line_fitting import fit_line
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.records import Reading, decisions, grouped, law_names, split
+from jaxdamp.cli.signatures import Arguments
 from jaxdamp.cli.table_fitting import Refused, fit_table, records_of, through_points
 from jaxdamp.cli.vehicle_words import read_law
 from jaxdamp.dampers import AbstractDamper
@@ -131,7 +132,7 @@ def _given(**options: object) -> list[Refused]:
     return [Refused(name, bool(value)) for name, value in options.items()]
 
 
-def _options(how: Call, rig: Sequence[str]) -> dict[str, Any]:
+def _options(how: Call, rig: Sequence[str]) -> Arguments:
     """The options of every fit, checked before anything is read."""
     options = how.arguments()
     if isinstance(weighting := options.get("weighting", "samples"), str):
@@ -155,7 +156,7 @@ class Fits(NamedTuple):
 
     work: Job
     names: Sequence[str]
-    options: Mapping[str, Any]
+    options: Arguments
     found: Preflight
     remarks: Sequence[str]
     cross_validate: bool

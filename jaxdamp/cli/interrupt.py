@@ -13,7 +13,6 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
 
 
 SIGNALS = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}  # and what Python does with them
@@ -103,7 +102,9 @@ def undisturbed() -> Iterator[None]:
 
 
 @contextmanager
-def watched(then: Any = signal.default_int_handler) -> Iterator[None]:
+def watched(
+    then: Callable[..., object] | signal.Handlers = signal.default_int_handler,
+) -> Iterator[None]:
     """Take over Ctrl-C and SIGTERM while this lasts.
 
     Nothing changes where a command is called from a program that handles Ctrl-C itself, from another thread than the

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from jaxdamp._tables import Table
 from jaxdamp.cli import interrupt
@@ -70,7 +70,7 @@ class Job(NamedTuple):
             yield self.results.draft
             self.results.publish(missing)
 
-    def page(self, report: Callable[..., Report], *contents: Any, part: str = "", **more: Any) -> None:
+    def page(self, report: Callable[..., Report], *contents: object, part: str = "", **more: object) -> None:
         """Draw the pictures and write the page.
 
         Arguments:

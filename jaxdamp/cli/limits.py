@@ -1,7 +1,6 @@
 """Limits of ride metrics and of parameters as a shop writes them: in SI, or in a unit of its own."""
 
 from collections.abc import Iterable, Mapping
-from typing import Any
 
 import numpy as np
 
@@ -42,7 +41,7 @@ def in_si(limits: Mapping[str, Limit], car: AbstractVehicle, *, white: bool) -> 
     return found, said
 
 
-def bounds_in_si(bounds: Mapping[str, tuple[Bound, Bound]], models: Iterable[object]) -> dict[str, Any]:
+def bounds_in_si(bounds: Mapping[str, tuple[Bound, Bound]], models: Iterable[object]) -> dict[str, tuple[Bound, ...]]:
     """Bounds of parameters by path, last part or pattern, with their ends in SI.
 
     Arguments:

@@ -14,13 +14,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import typer
 
 from jaxdamp.cli import offers
 from jaxdamp.cli.offers import Written
-from jaxdamp.cli.signatures import REQUIRED, Argument, arguments, options_class
+from jaxdamp.cli.signatures import REQUIRED, Argument, Arguments, arguments, options_class
 
 
 PLAIN = {"str": str, "int": int, "float": float, "bool": bool}
@@ -41,9 +41,9 @@ class Call:
     """
 
     target: str
-    given: Mapping[str, Any] = field(default_factory=dict)
+    given: Arguments = field(default_factory=dict)
 
-    def arguments(self, **more: Any) -> dict[str, Any]:
+    def arguments(self, **more: object) -> Arguments:
         """All of these, and more, as the function takes them: those of nested options in objects of their classes."""
         values = {**self.given, **more}
         paths = {leaf.argument.name: leaf.path for leaf in _leaves(self.target)}
@@ -133,7 +133,7 @@ def parameters(command: str, target: str) -> list[inspect.Parameter]:
         name, argument = leaf.option, leaf.argument
         positional = argument.positional and len(leaf.path) == 1
         default = argument.default
-        words: dict[str, Any] = {"help": _help(command, name, argument, how)}
+        words: Arguments = {"help": _help(command, name, argument, how)}
         if isinstance(how, Written):
             kind, words["metavar"] = list[str] if how.repeated else str, how.metavar
         else:
@@ -152,9 +152,9 @@ def parameters(command: str, target: str) -> list[inspect.Parameter]:
     return made
 
 
-def values(target: str, given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
+def values(target: str, given: Mapping[str, object]) -> dict[tuple[str, ...], object]:
     """The values of the options that were given, by the path of each argument."""
-    read: dict[tuple[str, ...], Any] = {}
+    read: dict[tuple[str, ...], object] = {}
     for leaf, how in offered(target).items():
         text = given.get(leaf.option)
         if text not in (None, []):
@@ -162,9 +162,9 @@ def values(target: str, given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
     return read
 
 
-def build(target: str, read: Mapping[tuple[str, ...], Any]) -> dict[str, Any]:
+def build(target: str, read: Mapping[tuple[str, ...], object]) -> Arguments:
     """The arguments of a function: plain ones, objects of nested classes, and `Call` of what it calls."""
-    made: dict[str, Any] = {path[0]: value for path, value in read.items() if len(path) == 1}
+    made: Arguments = {path[0]: value for path, value in read.items() if len(path) == 1}
     for argument in arguments(target):
         inside = {path[1:]: value for path, value in read.items() if path[0] == argument.name and len(path) > 1}
         nested = "" if argument.callee else _nested(argument)

@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from jaxdamp import _checks, bench, identify
 from jaxdamp._checks import Setting
@@ -54,7 +54,7 @@ class Reading:
             return None
         return bench.read_table(list(files), side=self.side, **given)
 
-    def processing(self) -> dict[str, Any]:
+    def processing(self) -> dict[str, object]:
         """The steps of `BenchRun.process`.
 
         >>> steps = Call("bench.Steps", {"low_pass": 50.0})

@@ -8,14 +8,14 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import typer
 from filelock import FileLock, Timeout
 
+from jaxdamp._tables import Contents
 from jaxdamp._writing import own_place, renamed, sync, write_whole
 from jaxdamp.cli import interrupt, resuming
 from jaxdamp.cli.interrupt import Interrupted
@@ -300,7 +300,7 @@ def _earlier_files(target: Path, command: str, replace: bool) -> list[str]:
     )
 
 
-def _manifest(folder: Path) -> dict[str, Any]:
+def _manifest(folder: Path) -> Contents:
     """What the manifest of a folder says; empty if no command wrote one there."""
     try:
         manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
@@ -309,7 +309,7 @@ def _manifest(folder: Path) -> dict[str, Any]:
         return {}
 
 
-def _unchanged(folder: Path, manifest: Mapping[str, Any]) -> list[str]:
+def _unchanged(folder: Path, manifest: Contents) -> list[str]:
     """The files of a manifest that are inside the folder, wherever links lead, and as they were written."""
     hashes = manifest.get("sha256", {})
     files = []

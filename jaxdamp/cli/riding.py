@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -18,8 +18,9 @@ from jaxdamp.cli.vehicle_words import parse_vehicle, read_law
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import match_paths, named_parameters
 from jaxdamp.report import Table, axles_sentence, notes_of, ride_report, ride_tables, ride_verdict
-from jaxdamp.roads import AbstractRoad
+from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Response
+from jaxdamp.tune import Run
 from jaxdamp.vehicles import GOALS, AbstractVehicle
 
 
@@ -54,19 +55,19 @@ class Driving:
     dt: float = 1e-3
     seed: int = 0
 
-    def over(self, word: str, count: int = 1) -> tuple[list[Any], dict[str, Any]]:
+    def over(self, word: str, count: int = 1) -> tuple[list[AbstractRoad] | list[WhiteRoad], Run]:
         """So many realisations of the road that a word means, and the options of a run over them."""
         _checks.positive("speed", self.speed)
         kind, _, rest = word.partition(":")
         if kind == "white":
             if self.duration is not None:
                 _checks.refuse("duration", "be left out on a white road", self.duration)
-            return [roads.white(rest, self.speed)] * count, {}
+            return [roads.white(rest, self.speed)] * count, Run()
         length = self.duration or USUAL
         seeds = range(self.seed, self.seed + count)
         realisations = [parse_road(word, speed=self.speed, duration=length, seed=seed) for seed in seeds]
         own = length if self.duration or kind == "iso" else realisations[0].duration or length
-        return realisations, {"duration": own, "dt": self.dt}
+        return realisations, Run(duration=own, dt=self.dt)
 
 
 def parse_road(word: str, *, speed: float, duration: float, seed: int) -> AbstractRoad:

@@ -1,15 +1,15 @@
 """Units, sign and words of what a command shows: from its options, or from `jaxdamp.toml` here or in ~/.config."""
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from jaxdamp import _checks
 from jaxdamp._display import Display, shown_in
 from jaxdamp._documents import read_toml
 from jaxdamp.cli.console import Screen
+from jaxdamp.cli.signatures import Arguments
 from jaxdamp.cli.wording import in_command_line
 
 
@@ -18,7 +18,7 @@ KEYS = ("units", "sign")
 
 
 @contextmanager
-def chosen(given: Mapping[str, Any], screen: Screen) -> Iterator[None]:
+def chosen(given: Arguments, screen: Screen) -> Iterator[None]:
     """Tables, pictures and CSV as the options say, then a file in this folder, then the file of the user.
 
     Arguments:
@@ -39,7 +39,7 @@ def chosen(given: Mapping[str, Any], screen: Screen) -> Iterator[None]:
         yield
 
 
-def _files(asked: Any) -> list[Path]:
+def _files(asked: Iterable[Path]) -> list[Path]:
     """The files that may hold settings, the nearest first: of this folder, of a folder that is read, of the user."""
     settings = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config")
     folders = [Path(), *(path for path in map(Path, asked) if path.is_dir()), settings]

@@ -9,9 +9,10 @@ import re
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 
+Arguments: TypeAlias = dict[str, Any]  # of a function or a command, by name
 ROOT = Path(__file__).parents[1]
 REQUIRED = object()  # the default of an argument without one
 _SECTIONS = re.compile(r"^(Arguments|Attributes|Returns|Raises|Yields):\n", re.M)
@@ -33,7 +34,7 @@ class Argument(NamedTuple):
 
     name: str
     kinds: tuple[str, ...]
-    default: Any
+    default: object
     text: str
     positional: bool = False
     callee: str = ""
@@ -176,7 +177,7 @@ def _kinds(module: str, node: ast.expr) -> Iterator[str]:
         yield ast.unparse(node)
 
 
-def _value(module: str, node: ast.expr) -> Any:
+def _value(module: str, node: ast.expr) -> object:
     """A default that is a literal or the name of one; otherwise an ellipsis."""
     try:
         if isinstance(node, ast.Name):

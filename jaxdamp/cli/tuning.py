@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -18,15 +18,16 @@ from jaxdamp.cli.limits import axes_in_si, bounds_in_si, in_si
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.riding import Driving, beyond_vehicles, unusual
 from jaxdamp.cli.sharing import sweep_part, swept
+from jaxdamp.cli.signatures import Arguments
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, read_module, with_law, write_laws
-from jaxdamp.cli.words import Axis
+from jaxdamp.cli.words import Axis, Limit
 from jaxdamp.control import Controlled
 from jaxdamp.dampers import AbstractDamper, Scheduled
 from jaxdamp.parameters import match_paths, modules_inside, named_parameters
 from jaxdamp.report import MOST_POINTS, Table, best_points, sweep_report, tuning_report
-from jaxdamp.roads import WhiteRoad
+from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import stationary_notes
-from jaxdamp.tune import Status, TuneResult, limit_spans
+from jaxdamp.tune import Run, Status, TuneResult, limit_spans
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -90,7 +91,7 @@ def _settings(car: AbstractVehicle) -> dict[str, tune.Choice]:
     return {f"{path}command": tune.Choice(np.asarray(law.levels)) for path, law in laws}
 
 
-def _realisations(road: str, driving: Driving, count: int) -> tuple[list[Any], dict[str, Any]]:
+def _realisations(road: str, driving: Driving, count: int) -> tuple[list[AbstractRoad] | list[WhiteRoad], Run]:
     """The roads to tune on, and the options of a run over them."""
     if count < 1:
         _checks.refuse("roads", "be 1 or more", count)
@@ -100,8 +101,13 @@ def _realisations(road: str, driving: Driving, count: int) -> tuple[list[Any], d
 
 
 def tuning_arguments(
-    car: AbstractVehicle, metric: str, roads: Sequence[Any], search: Call, seed: int, run: Mapping[str, Any]
-) -> tuple[dict[str, Any], list[str]]:
+    car: AbstractVehicle,
+    metric: str,
+    roads: Sequence[AbstractRoad | WhiteRoad],
+    search: Call,
+    seed: int,
+    run: Run,
+) -> tuple[Arguments, list[str]]:
     """The arguments of `tune.minimise`, and what was chosen by default, in words."""
     limits, remarks = _limits(car, metric, search, white=isinstance(roads[0], WhiteRoad))
     road = roads[0] if len(roads) == 1 else tune.Scenarios(roads)
@@ -110,7 +116,7 @@ def tuning_arguments(
     return call, remarks
 
 
-def _limits(car: AbstractVehicle, metric: str, search: Call, *, white: bool) -> tuple[dict[str, Any], list[str]]:
+def _limits(car: AbstractVehicle, metric: str, search: Call, *, white: bool) -> tuple[dict[str, Limit], list[str]]:
     """The limits given, that of the grip by default, and a remark on it."""
     limits, remarks = in_si(search.given.get("limits", {}), car, white=white)
     if not {"grip", *car.goal_metrics("grip", white=white)} & {*limits, metric}:
@@ -120,7 +126,7 @@ def _limits(car: AbstractVehicle, metric: str, search: Call, *, white: bool) -> 
     return {name: limit for name, limit in limits.items() if limit is not None}, remarks
 
 
-def tuned(screen: Screen, call: Mapping[str, Any]) -> TuneResult[Any]:
+def tuned(screen: Screen, call: Arguments) -> TuneResult:
     """The result of `tune.minimise` with these arguments, shown at the terminal."""
     with screen.stage("Tuning") as advance:
         result = tune.minimise(**call, progress=lambda step, value: advance(f"step {step}: {value:.5g}", step))
@@ -140,13 +146,13 @@ def _baseline(path: Path, car: AbstractVehicle) -> AbstractVehicle:
     return with_law(car, module) if isinstance(module, AbstractDamper) else module
 
 
-def exit_code_of(result: TuneResult[Any] | None) -> None:
+def exit_code_of(result: TuneResult | None) -> None:
     """End with exit code 1 if a limit is not met."""
     if result is not None and result.status is Status.LIMIT_NOT_MET:
         raise typer.Exit(1)
 
 
-def write_tuning(folder: Path, result: TuneResult[Any]) -> None:
+def write_tuning(folder: Path, result: TuneResult) -> None:
     """The tuned laws, the vehicle, tables, and all of it as JSON."""
     write_laws(folder, result.vehicle)
     export.to_json(result.vehicle, folder / "vehicle.json")
@@ -172,7 +178,7 @@ def sweep_command(
     over: Mapping[str, Axis],
     start: Path | None = None,
     metric: Sequence[str] = ("comfort", "travel", "grip"),
-    limit: Mapping[str, Any] | None = None,
+    limit: Mapping[str, Limit] | None = None,
     driving: Driving,
     how: Annotated[Call, "sweeps.sweep"],
     baseline: Path | None = None,
@@ -255,7 +261,7 @@ def _present(car: AbstractVehicle, over: Mapping[str, np.ndarray]) -> dict[str, 
     return {name: value.pop() for name, value in values.items() if len(value) == 1}
 
 
-def _limits_by_metric(limit: Mapping[str, Any], car: AbstractVehicle, *, white: bool) -> dict[str, Any]:
+def _limits_by_metric(limit: Mapping[str, Limit], car: AbstractVehicle, *, white: bool) -> dict[str, Limit]:
     """The limits by the ride metrics that their words mean."""
     given = {word: span for word, span in limit.items() if span is not None}
     return {name: span for word, span in given.items() for name in _metrics_of("limit", word, car, white=white)}

@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -15,7 +15,9 @@ from jaxdamp.cli.jobs import Output, job, write_tables
 from jaxdamp.cli.limits import bounds_in_si
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.records import decisions
+from jaxdamp.cli.signatures import Arguments
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, write_laws
+from jaxdamp.cli.words import Named
 from jaxdamp.dampers import CoulombFriction
 from jaxdamp.identify import Failure, VehicleComparison, VehicleFit, VehicleRung
 from jaxdamp.report import ride_records_table, vehicle_comparison_report, vehicle_fit_report
@@ -25,8 +27,6 @@ from jaxdamp.vehicles import AbstractVehicle, Guide, Guided
 
 
 FRICTION_VELOCITY = 0.01  # m/s, over which the friction of a guide changes its sign, unless it is stated
-Options = dict[str, Any]  # further arguments of `fit_vehicle`
-Named = tuple[str, dict[str, float]]  # an owner and its numbers, as in stroke:offset,delay=0.001
 
 
 def fit_vehicle(
@@ -89,13 +89,13 @@ def friction_forms(words: Sequence[str]) -> tuple[str, ...]:
     return identify.FORMS if "all" in words else tuple(dict.fromkeys(words))
 
 
-def _fitted(screen: Screen, car: AbstractVehicle, rides: Sequence[RideRecord], call: Mapping[str, Any]) -> VehicleFit:
+def _fitted(screen: Screen, car: AbstractVehicle, rides: Sequence[RideRecord], call: Arguments) -> VehicleFit:
     with screen.stage("Fitting"):
         return identify.fit_vehicle(car, rides, **call)
 
 
 def _compared(
-    screen: Screen, car: AbstractVehicle, forms: Sequence[str], rides: Sequence[RideRecord], call: Options
+    screen: Screen, car: AbstractVehicle, forms: Sequence[str], rides: Sequence[RideRecord], call: Arguments
 ) -> VehicleComparison:
     """The vehicle with each form of friction, fitted and judged on drives left out; said at the terminal."""
     ladder, call = identify.friction_ladder(car, forms), dict(call)
@@ -121,10 +121,10 @@ def fit_arguments(
     benches: Mapping[str, BenchSet],
     how: Call,
     guide: Sequence[Named],
-) -> tuple[AbstractVehicle, Options]:
+) -> tuple[AbstractVehicle, Arguments]:
     """The vehicle with its guides, and the further arguments of `fit_vehicle`."""
     given, paths = how.given, dict(benches)
-    more: Options = {}
+    more: Arguments = {}
     guides = [guide_words(body, numbers, car) for body, numbers in guide]
     if guides:
         own = [f"guides.{i}.{name}" for i, (_, free) in enumerate(guides) for name in free]

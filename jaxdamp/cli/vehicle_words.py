@@ -3,11 +3,12 @@
 import inspect
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import equinox as eqx
 
 from jaxdamp import _checks, export, vehicles
+from jaxdamp._tables import Contents
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.early import EXAMPLE, FROM_FIT, FROM_LIST, read_json, read_vehicle
 from jaxdamp.dampers import AbstractDamper
@@ -18,6 +19,7 @@ from jaxdamp.tune import damper_paths
 from jaxdamp.vehicles import AbstractVehicle
 
 
+T = TypeVar("T")
 MakeCar = Callable[[AbstractDamper | None], AbstractVehicle]
 
 
@@ -76,7 +78,7 @@ def read_law(argument: str, path: Path) -> AbstractDamper:
     return read_module(argument, path, AbstractDamper, "a law", FROM_FIT)
 
 
-def read_module(argument: str, path: Path, kinds: type | tuple[type, ...], words: str, remedy: str = "") -> Any:
+def read_module(argument: str, path: Path, kinds: type[T] | tuple[type[T], ...], words: str, remedy: str = "") -> T:
     """What a JSON file of `export.to_json` holds.
 
     Arguments:
@@ -95,7 +97,7 @@ def read_module(argument: str, path: Path, kinds: type | tuple[type, ...], words
     return module
 
 
-def _preset(word: str, document: Mapping[str, Any]) -> MakeCar:
+def _preset(word: str, document: Contents) -> MakeCar:
     extra = [key for key in document if key not in ("preset", "tyre_lifts", "parameters")]
     name, values, lifts = document.get("preset"), document.get("parameters", {}), document.get("tyre_lifts", False)
     if extra or not (isinstance(name, str) and isinstance(values, dict) and isinstance(lifts, bool)):
@@ -106,7 +108,7 @@ def _preset(word: str, document: Mapping[str, Any]) -> MakeCar:
     return lambda law: replace(presets()[name](damper=law, tyre_lifts=lifts), numbers)
 
 
-def _flat(values: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
+def _flat(values: Mapping[str, object], prefix: str = "") -> list[tuple[str, object]]:
     """Tables inside a table as paths: `[parameters.front] spring_rate = 2e4` is front.spring_rate."""
     found = []
     for key, value in values.items():

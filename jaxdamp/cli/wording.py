@@ -3,7 +3,6 @@
 import ast
 import re
 import shlex
-from typing import Any
 
 from jaxdamp._checks import ArgumentError, Setting
 from jaxdamp.cli.application import own_words
@@ -92,7 +91,7 @@ def option_text(setting: Setting, name: str = "") -> str:
     return f"{name} {value if '...' in value else shlex.quote(value)}"
 
 
-def _word(value: Any) -> str:
+def _word(value: object) -> str:
     if value is None:
         return "none"
     return "..." if value is ... else f"{value:g}" if isinstance(value, float) else str(value)

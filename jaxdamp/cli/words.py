@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -11,7 +11,9 @@ from jaxdamp import _checks
 
 Bound = float | str | None  # of a limit: a number, or a text that is relative or has a unit; None for no end
 Limit = Bound | tuple[Bound, Bound]
-Reader = Callable[[str, Any], Any]  # gives the value of an option, from its name and its text or texts
+Named = tuple[str, dict[str, float]]  # an owner and its numbers, as in stroke:offset,delay=0.001
+T = TypeVar("T")
+Reader = Callable[[str, Any], object]  # gives the value of an option, from its name and its text or texts
 
 
 def words(option: str, texts: Sequence[str]) -> list[str]:
@@ -61,7 +63,9 @@ def columns(option: str, given: Sequence[str]) -> list[str | int | None]:
     return [column(text) for text in given]
 
 
-def named(value: Callable[[str], Any], must: str = "be numbers", like: str = "NAME=VALUE") -> Reader:
+def named(
+    value: Callable[[str], T], must: str = "be numbers", like: str = "NAME=VALUE"
+) -> Callable[[str, Sequence[str]], dict[str, T]]:
     """The reader of "a=1,b=2".
 
     Arguments:
@@ -73,7 +77,7 @@ def named(value: Callable[[str], Any], must: str = "be numbers", like: str = "NA
     {'stroke': 0.0002}
     """
 
-    def read(option: str, given: Sequence[str]) -> dict[str, Any]:
+    def read(option: str, given: Sequence[str]) -> dict[str, T]:
         found = {}
         for name, text in pairs(option, given, like):
             try:
@@ -226,7 +230,7 @@ def axes(option: str, given: Sequence[str]) -> dict[str, Axis]:
     return found
 
 
-def named_numbers(known: Mapping[str, float | None], example: str) -> Reader:
+def named_numbers(known: Mapping[str, float | None], example: str) -> Callable[[str, Sequence[str]], list[Named]]:
     """The reader of texts such as "stroke:offset,delay=0.001".
 
     It gives the owner and its numbers of each text; those without a value take that of `known`.
@@ -235,10 +239,10 @@ def named_numbers(known: Mapping[str, float | None], example: str) -> Reader:
     [('stroke', {'offset': 0.0, 'delay': 0.001})]
     """
 
-    def read(option: str, given: Sequence[str]) -> list[Any]:
+    def read(option: str, given: Sequence[str]) -> list[Named]:
         return [one(option, text) for text in given]
 
-    def one(option: str, text: str) -> tuple[str, dict[str, float]]:
+    def one(option: str, text: str) -> Named:
         owner, _, rest = (part.strip() for part in text.partition(":"))
         if not owner or not rest:
             must = "read like NAME:NUMBER=START,NUMBER=START"
