@@ -148,7 +148,9 @@ def test_the_factors_of_usual_units_are_those_of_pint():
     registry = pint.UnitRegistry()
     for role, factors in units._KNOWN.items():
         for unit, factor in factors.items():
-            assert factor == pytest.approx(registry.Quantity(1.0, unit).to(units.SI.get(role, "V")).magnitude, rel=1e-15)
+            assert factor == pytest.approx(
+                registry.Quantity(1.0, unit).to(units.SI.get(role, "V")).magnitude, rel=1e-15
+            )
             others = set(units.SI) - {role, "command" if role == "signal" else role}
             assert not any(conversion(other, unit) for other in others)
 
