@@ -3,9 +3,8 @@
 import json
 import re
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from jaxdamp._tables import Contents
 
@@ -31,14 +30,14 @@ def read_toml(file: Path) -> Contents:
         raise ValueError(f"{file} is no valid TOML: {_said(error)}.") from error
 
 
-def parse_json(text: str, refuse: Callable[[str], NoReturn] | None = None) -> Any:
-    """What a JSON text says; `refuse` raises what is said of NaN and infinity.
+def parse_json(text: str, **options: Any) -> Any:
+    """What a JSON text says, with the options of `json.loads`.
 
     Raises:
         ValueError: no JSON, or nested too deeply.
     """
     try:
-        return json.loads(text, parse_constant=refuse)
+        return json.loads(text, **options)
     except (json.JSONDecodeError, RecursionError) as error:
         raise ValueError(_said(error)) from error
 

@@ -8,19 +8,15 @@ import functools
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
-
-
-if TYPE_CHECKING:
-    from threadpoolctl import ThreadpoolController, _ThreadpoolLimiter
+from typing import Any
 
 
 _lock = threading.Lock()
-_open: list["_ThreadpoolLimiter | None"] = []  # one entry for each fit that runs, the first with the limit to lift
+_open: list[Any] = []  # one entry for each fit that runs, the first with the limit to lift
 
 
 @functools.cache
-def _controller() -> "ThreadpoolController":
+def _controller() -> Any:
     from threadpoolctl import ThreadpoolController  # looks up the loaded libraries, once
 
     return ThreadpoolController()

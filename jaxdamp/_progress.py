@@ -4,13 +4,9 @@ import sys
 import time
 from collections.abc import Callable
 from types import TracebackType
-from typing import TYPE_CHECKING, final
+from typing import Any, final
 
 from jaxdamp import _checks
-
-
-if TYPE_CHECKING:
-    from IPython.display import DisplayHandle
 
 
 BAR = 20  # characters
@@ -58,7 +54,7 @@ class Progress:
             self._stream.flush()
 
 
-def _displayed(line: str, output: "DisplayHandle | None") -> "DisplayHandle | None":
+def _displayed(line: str, output: Any) -> Any:
     """Show a line below the cell, in place of what an earlier output showed; gives the output."""
     from IPython.display import display
 

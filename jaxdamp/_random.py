@@ -6,7 +6,8 @@ the numbers are those of `jax.random`.
 """
 
 import math
-from typing import TYPE_CHECKING, Any
+import warnings
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -16,10 +17,6 @@ from jaxtyping import Array, Float, UInt32
 
 from jaxdamp import _checks
 from jaxdamp._forked import refuse_fork
-
-
-if TYPE_CHECKING:
-    import scipy.stats
 
 
 _MASK = 0xFFFFFFFF
@@ -81,12 +78,16 @@ def rayleigh(above: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
     return jnp.sqrt(-jnp.log(jnp.clip(above, _FEWEST, 1.0)))
 
 
-def sobol_sequence(variables: int, seed: int) -> "scipy.stats.qmc.Sobol":
-    """A scrambled Sobol sequence of so many variables."""
+def sobol_points(seed: int, variables: int, first: int, count: int) -> np.ndarray:
+    """Consecutive points of a scrambled Sobol sequence, shape (count, variables)."""
     from scipy.stats import qmc
 
     options: dict[str, Any] = {"seed": np.random.default_rng(seed)}  # SciPy 1.15 calls it `rng`, and still takes this
-    return qmc.Sobol(variables, **options)
+    sequence = qmc.Sobol(variables, **options)
+    if first:
+        sequence.fast_forward(first)
+    with warnings.catch_warnings(action="ignore"):  # that the number of points is no power of two
+        return sequence.random(max(count, 1))[:count]
 
 
 def sign(seed: int | Array, shape: tuple[int, ...]) -> Float[Array, "..."]:

@@ -97,7 +97,7 @@ def from_json(path_or_text: str | os.PathLike[str]) -> PyTree:
             raise FileNotFoundError(f"There is no file {str(file)!r} (text would have to begin with '{{').")
         source, text = str(file), read_text(file, "JSON")
     try:
-        document = parse_json(text, _no_constant)
+        document = parse_json(text, parse_constant=_no_constant)
     except ValueError as error:
         raise ValueError(f"It must be written in JSON, but {source} is not: {error}.") from error
     kind = FORMATS.get(str(document.get("format"))) if isinstance(document, dict) else None

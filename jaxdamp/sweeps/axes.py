@@ -2,7 +2,6 @@
 
 import dataclasses
 import functools
-import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import final
@@ -10,7 +9,7 @@ from typing import final
 import numpy as np
 
 from jaxdamp import _checks
-from jaxdamp._random import sobol_sequence
+from jaxdamp._random import sobol_points
 from jaxdamp._traced import of_known_numbers
 
 
@@ -210,7 +209,7 @@ def sobol(ranges: Ranges, count: int, *, seed: int = 0, log: bool | Sequence[str
     >>> sobol({"rate": (1000.0, 2000.0), "mass": (200.0, 400.0)}, 64).count
     64
     """
-    return _drawn(ranges, count, log, functools.partial(_sobol, seed, len(ranges)))
+    return _drawn(ranges, count, log, functools.partial(sobol_points, seed, len(ranges)))
 
 
 def _uniform(seed: int, axes: int, first: int, count: int) -> np.ndarray:
@@ -218,15 +217,6 @@ def _uniform(seed: int, axes: int, first: int, count: int) -> np.ndarray:
     generator = np.random.PCG64(seed)
     generator.advance(first * axes)
     return np.random.Generator(generator).random((count, axes))
-
-
-def _sobol(seed: int, axes: int, first: int, count: int) -> np.ndarray:
-    """Consecutive points of the scrambled sequence."""
-    sequence = sobol_sequence(axes, seed)
-    if first:
-        sequence.fast_forward(first)
-    with warnings.catch_warnings(action="ignore"):  # that the number of points is no power of two
-        return sequence.random(count)
 
 
 def as_points(over: object) -> AbstractPoints:

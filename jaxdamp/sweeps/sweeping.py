@@ -7,7 +7,7 @@ import warnings
 import zlib
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from pathlib import Path
-from typing import final, overload
+from typing import TypedDict, Unpack, final, overload
 
 import jax
 import numpy as np
@@ -34,32 +34,24 @@ CHECKSUMS = "checksums"  # attribute: of each block of points
 BLOCK = 4096  # points
 
 
+class _Options(TypedDict, total=False):
+    """What `sweep` takes beside function, points and `summary`, for type checkers."""
+
+    chunk: int | None
+    devices: int | Sequence[object] | None
+    gradients: Gradients
+    file: str | os.PathLike[str] | None
+    cluster: Cluster
+    progress: Callable[[int, int], None] | None
+
+
+Over = Mapping[str, object] | AbstractPoints
+
+
 @overload
-def sweep(
-    function: PointFunction,
-    over: Mapping[str, object] | AbstractPoints,
-    *,
-    chunk: int | None = None,
-    devices: int | Sequence[object] | None = None,
-    gradients: Gradients = False,
-    file: str | os.PathLike[str] | None = None,
-    cluster: Cluster = None,
-    summary: None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> Dataset: ...
+def sweep(function: PointFunction, over: Over, *, summary: None = None, **options: Unpack[_Options]) -> Dataset: ...
 @overload
-def sweep(
-    function: PointFunction,
-    over: Mapping[str, object] | AbstractPoints,
-    *,
-    chunk: int | None = None,
-    devices: int | Sequence[object] | None = None,
-    gradients: Gradients = False,
-    file: str | os.PathLike[str] | None = None,
-    cluster: Cluster = None,
-    summary: Summary,
-    progress: Callable[[int, int], None] | None = None,
-) -> SweepSummary: ...
+def sweep(function: PointFunction, over: Over, *, summary: Summary, **options: Unpack[_Options]) -> SweepSummary: ...
 @of_known_numbers
 def sweep(
     function: PointFunction,

@@ -32,18 +32,13 @@ NO_EFFECT = 1e-6  # change of a metric per 100 % of a parameter, relative to its
 
 
 @runtime_checkable
-class FittedNumber(Protocol):
-    """An estimate: its name, and the names of the numbers tied to it."""
+class _Estimate(Protocol):
+    """What is read of an estimate."""
 
     @property
-    def name(self) -> str:
-        """The path of the number."""
-        ...
-
+    def name(self) -> str: ...
     @property
-    def tied(self) -> Sequence[str]:
-        """Those of the numbers tied to it."""
-        ...
+    def tied(self) -> Sequence[str]: ...
 
 
 @runtime_checkable
@@ -60,7 +55,7 @@ class FittedLaw(Protocol):
         ...
 
     @property
-    def parameters(self) -> Sequence[FittedNumber]:
+    def parameters(self) -> Sequence[_Estimate]:
         """The estimates."""
         ...
 
@@ -296,7 +291,7 @@ def _metrics_of(
     return _DamperMetrics(values, variance), notes
 
 
-def _effects(estimates: Sequence[FittedNumber], names: Sequence[str]) -> Float[np.ndarray, "numbers free"]:
+def _effects(estimates: Sequence[_Estimate], names: Sequence[str]) -> Float[np.ndarray, "numbers free"]:
     """Change of each number of a law per change of each estimate: one, or a share where the law has a mean."""
     of_wrapper = all(name in names or name.rpartition("[")[0] in names for name in (str(e.name) for e in estimates))
     prefix = "" if of_wrapper else "law."  # of a law on a machine, beside which `Lag(law, ...)` has such paths too

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from jaxdamp import _checks
-from jaxdamp._random import sobol_sequence
+from jaxdamp._random import sobol_points
 from jaxdamp._tables import with_tied
 from jaxdamp.dampers import not_identified
 from jaxdamp.parameters import (
@@ -175,7 +175,7 @@ def start_points(space: SearchRange, count: int, seed: int) -> np.ndarray:
     """
     lower = np.where(np.isfinite(space.lower), space.lower, space.start - FACTOR * space.unit)
     upper = np.where(np.isfinite(space.upper), space.upper, space.start + FACTOR * space.unit)
-    unit = sobol_sequence(len(lower), seed).random_base2(max(count - 2, 0).bit_length())[: count - 1]
+    unit = sobol_points(seed, len(lower), 0, count - 1)
     points = lower + (upper - lower) * unit
     logarithmic = lower > 0
     ratio = upper[logarithmic] / lower[logarithmic]

@@ -9,21 +9,11 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 from jaxtyping import Float
 
-from jaxdamp import _checks
+from jaxdamp import _checks, _tables
 from jaxdamp._display import display
 from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
-from jaxdamp._tables import (
-    Column,
-    Compared,
-    Contents,
-    Table,
-    comparison_table,
-    percent_change,
-    plain,
-    typeset_unit,
-    with_unit,
-)
+from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, typeset_unit, with_unit
 from jaxdamp._types import Figure
 from jaxdamp.tune.combinations import Combinations
 from jaxdamp.tune.limits import LimitRange, written
@@ -294,7 +284,7 @@ class TuneResult(AbstractResult, Generic[V]):
         driven = {"combinations": self.combinations.table()} if self.combinations else {}
         return {"metrics": self.table(), "parameters": self.parameter_table()} | driven | several | tolerances
 
-    def content(self) -> Contents:
+    def content(self) -> _tables.Contents:
         """The tuning as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         sides = {"before": self.before, "after": self.after}
         words = ("metric", "violated", "active", "active_limits", "relaxation", "without_effect")

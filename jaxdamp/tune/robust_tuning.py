@@ -17,7 +17,7 @@ from jaxdamp.tune.result import ToleranceEffect, TuneResult, V
 from jaxdamp.tune.scenario_ride import Risk
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.sensitivities import sensitivity
-from jaxdamp.tune.settings import RUN, Run, Settings, completed, run_of
+from jaxdamp.tune.settings import RUN, Run, Settings, completed
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -65,7 +65,8 @@ def robust(
     tuning = minimise(metric, vehicle, scenarios, progress=progress, **settings)
     if not scatter:
         return tuning
-    effects = tolerance_effects(metric, tuning.vehicle, scenarios, scatter, **run_of(settings))
+    run = Run(duration=settings.get("duration"), dt=settings.get("dt"), engine=settings.get("engine"))
+    effects = tolerance_effects(metric, tuning.vehicle, scenarios, scatter, **run)
     return dataclasses.replace(tuning, tolerances=effects)
 
 

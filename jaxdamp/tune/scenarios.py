@@ -9,7 +9,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
-from jaxdamp._random import sobol_sequence
+from jaxdamp._random import sobol_points
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Point, Value
 from jaxdamp.metrics import Metric
@@ -195,7 +195,7 @@ def tolerances(scatter: Mapping[str, float], count: int, *, seed: int = 0) -> di
             _checks.refuse(f"scatter[{name!r}]", "be above 0 and below 1/3", deviation, remedy)
     if count < 1:
         _checks.refuse("count", "be one or more", count)
-    unit = sobol_sequence(len(scatter), seed).random_base2((count - 1).bit_length())[:count]
+    unit = sobol_points(seed, len(scatter), 0, count)
     factors = 1.0 + truncnorm.ppf(unit, -3.0, 3.0) * np.array(list(scatter.values()))
     return {
         f"sample {i + 1}": Condition(factors=dict(zip(scatter, map(float, row), strict=True)))

@@ -36,7 +36,7 @@ from jaxdamp.tune.measuring import Measurement
 from jaxdamp.tune.objective import Function, Objective, objective_of
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.sensitivity_result import CurveSensitivity, Sensitivity
-from jaxdamp.tune.settings import RUN, Asked, Free, Run, completed, run_of
+from jaxdamp.tune.settings import RUN, Asked, Free, Run, completed
 from jaxdamp.tune.shape import damper_paths, held_force
 from jaxdamp.tune.task import is_white
 from jaxdamp.vehicles import AbstractVehicle, ChannelKind
@@ -110,7 +110,7 @@ def sensitivity(
     wanted = list(metric) if isinstance(metric, Sequence) and not isinstance(metric, str) else [metric]
     given = dict(quantities or {})
     _check(wanted, vehicle, road, given)
-    first, run = (road if isinstance(road, GIVEN) else road(**given)), run_of(settings)
+    first, run = (road if isinstance(road, GIVEN) else road(**given)), Run(**{name: asked[name] for name in RUN})
     objective = _objective(wanted, vehicle, white=is_white(first))
     hatted, paths = _with_curves(vehicle, first, asked, run)
     of_vehicle, free = _free(vehicle, hatted, asked["over"], asked["freeze"])

@@ -98,11 +98,6 @@ DEFAULTS: Settings = {
 LEAST = {"points": 1, "between": 0, "starts": 1, "seed": 0, "max_steps": 1, "fresh_roads": 0}  # of the counts
 
 
-def run_of(settings: Run) -> Run:
-    """How a vehicle is driven, among all settings."""
-    return Run(duration=settings.get("duration"), dt=settings.get("dt"), engine=settings.get("engine"))
-
-
 def completed(call: str, given: Mapping[str, object], defaults: Mapping[str, object]) -> Asked:
     """Settings with the defaults of a call."""
     for name in given:

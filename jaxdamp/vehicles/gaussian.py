@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp._limits import at_least
 from jaxdamp._matrices import phi_functions, solve
-from jaxdamp._random import sobol_sequence
+from jaxdamp._random import sobol_points
 
 
 _DOUBLINGS = 50  # of the first interval, until nothing is left of the start
@@ -120,7 +120,7 @@ def _others(variables: int) -> tuple[np.ndarray, np.ndarray]:
         return grid, product / product.sum()
     import scipy.special
 
-    half = scipy.special.ndtri(sobol_sequence(variables, 0).random(_MANY // 2))
+    half = scipy.special.ndtri(sobol_points(0, variables, 0, _MANY // 2))
     points = np.concatenate([half, -half])
     spread = np.linalg.cholesky(points.T @ points / len(points))
     return np.linalg.solve(spread, points.T).T, np.full(len(points), 1.0 / len(points))
