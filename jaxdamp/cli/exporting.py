@@ -18,10 +18,7 @@ from jaxdamp.vehicles import AbstractVehicle
 
 
 Write = Callable[..., Path | list[Path]]  # a file, or several
-PROGRAMS: dict[str, tuple[str, Write]] = {
-    "c": (".c", export.to_c),
-    "fmu": (".fmu", export.to_fmu),
-}
+PROGRAMS: dict[str, tuple[str, Write]] = {"c": (".c", export.to_c), "fmu": (".fmu", export.to_fmu)}
 TABLES: dict[str, tuple[str, Write]] = {
     "adams": (".dpr", export.to_adams),
     "assetto-corsa": (".ini", export.to_assetto_corsa),

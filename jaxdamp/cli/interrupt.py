@@ -102,9 +102,7 @@ def undisturbed() -> Iterator[None]:
 
 
 @contextmanager
-def watched(
-    then: Callable[..., object] | signal.Handlers = signal.default_int_handler,
-) -> Iterator[None]:
+def watched(then: Callable[..., object] | signal.Handlers = signal.default_int_handler) -> Iterator[None]:
     """Take over Ctrl-C and SIGTERM while this lasts.
 
     Nothing changes where a command is called from a program that handles Ctrl-C itself, from another thread than the

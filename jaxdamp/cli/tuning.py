@@ -101,12 +101,7 @@ def _realisations(road: str, driving: Driving, count: int) -> tuple[list[Abstrac
 
 
 def tuning_arguments(
-    car: AbstractVehicle,
-    metric: str,
-    roads: Sequence[AbstractRoad | WhiteRoad],
-    search: Call,
-    seed: int,
-    run: Run,
+    car: AbstractVehicle, metric: str, roads: Sequence[AbstractRoad | WhiteRoad], search: Call, seed: int, run: Run
 ) -> tuple[Arguments, list[str]]:
     """The arguments of `tune.minimise`, and what was chosen by default, in words."""
     limits, remarks = _limits(car, metric, search, white=isinstance(roads[0], WhiteRoad))

@@ -120,9 +120,7 @@ class MetricValues(dict[str, Any]):
         """The value of a metric, or the default if there is no metric of this name."""
         return self[name] if name in self else default
 
-    def tree_flatten_with_keys(
-        self,
-    ) -> tuple[list[tuple[object, object]], tuple[tuple[str, str | None], ...]]:
+    def tree_flatten_with_keys(self) -> tuple[list[tuple[object, object]], tuple[tuple[str, str | None], ...]]:
         """Values with their names, and the names with their units."""
         names = sorted(self)
         return [(jax.tree_util.DictKey(name), self[name]) for name in names], tuple(

@@ -62,7 +62,7 @@ class SensitivitySettings(Free, Curves, Run, total=False):
 
 
 DEFAULTS: SensitivitySettings = {
-    "over": ("*",), "freeze": (), "dampers": "*damper", "reach": None, "hats": HATS, **RUN,
+    "over": ("*",), "freeze": (), "dampers": "*damper", "reach": None, "hats": HATS, **RUN
 }  # fmt: skip
 
 
