@@ -26,8 +26,6 @@ GROWN = 1e6
 Setting: TypeAlias = PyTree
 Period: TypeAlias = Callable[[State, Setting], tuple[State, State]]  # P(s), and the scale of each entry
 
-Inputs: TypeAlias = tuple[State, Period, Setting]
-
 
 class Shot(NamedTuple):
     """A period from a state."""
@@ -98,12 +96,12 @@ def steady_state(period: Period, start: State, setting: Setting) -> State:
     return jax.lax.while_loop(going, again, search).state
 
 
-def _as_it_is(inputs: Inputs) -> tuple[State, tuple[()]]:
+def _as_it_is(inputs: tuple[PyTree, ...]) -> tuple[State, tuple[()]]:
     return inputs[0], ()
 
 
-def _missing(state: State, _: object, inputs: Inputs) -> State:
-    _, period, setting = inputs
+def _missing(state: State, _: object, inputs: tuple[PyTree, ...]) -> State:
+    _, period, setting, *_ = inputs
     return period(state, setting)[0] - state
 
 

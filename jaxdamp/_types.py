@@ -19,7 +19,7 @@ Scalar = Float[Array, ""]
 State = Float[Array, " state"]
 Signal = Float[Array, " time"]
 VectorLike = Float[Array, " _"] | Float[np.ndarray, " _"] | Sequence[float]
-Value: TypeAlias = ArrayLike | Sequence[float]  # of a parameter
+Value: TypeAlias = ArrayLike | Sequence[float | int]  # of a parameter
 Point: TypeAlias = Mapping[str, Value]  # by path
 SignalLike = Float[Array, " time"] | Float[np.ndarray, " time"]
 
