@@ -62,7 +62,7 @@ ROLES: Mapping[str, Look] = MappingProxyType(
 )
 """What a line of your own figure is drawn with: `axes.plot(x, y, **plots.ROLES["after"])`. "shade" is for what is
 extrapolated, or a range that is allowed."""
-STYLE: Mapping[str, object] = MappingProxyType(
+STYLE: Mapping[str, bool | str] = MappingProxyType(
     {
         "figure.constrained_layout.use": True,
         "axes.prop_cycle": f"cycler('color', {list(COLOURS)})",

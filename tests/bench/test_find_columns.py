@@ -174,7 +174,9 @@ def test_usual_headers_are_read_without_pint(head, tmp_path, monkeypatch):
     for cached in (units.conversion, units.is_unit, units.ratio):
         cached.cache_clear()
     monkeypatch.setattr(units, "_registry", refused)
-    more = {"units": {"time": "s", "stroke": "mm"}, "gains": {"force": "500 N/V"}} if "Zeit,Weg,Kraft_V" in head else {}
+    more: dict = (
+        {"units": {"time": "s", "stroke": "mm"}, "gains": {"force": "500 N/V"}} if "Zeit,Weg,Kraft_V" in head else {}
+    )
     run = bench.read(written(tmp_path, head), sign="rebound-positive", **more)[0]
     assert len(run) == 1000
 

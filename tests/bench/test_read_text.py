@@ -12,7 +12,7 @@ def read_table(path, delimiter=None) -> RawTable:
 
 
 def values(table: RawTable) -> np.ndarray:
-    return np.stack([column.values for column in table.columns], axis=1)
+    return np.stack([np.asarray(column.values) for column in table.columns], axis=1)
 
 
 def units(table: RawTable) -> tuple[str, ...]:

@@ -323,7 +323,7 @@ def test_it_speaks_the_words_and_has_the_colours_of_the_pictures(tmp_path, brows
     assert "878.9" in boxes and "0.09159" in boxes and number(browser, "law.compression_rate") == 878.877123
     seen = "['law', 'baseline', 'measured', 'bad', 'curve0', 'curve1', 'curve2', 'curve3'].map((name) => colour(name))"
     roles = [plots.ROLES[name]["color"] for name in ("after", "before", "measured", "limit")]
-    palette = re.findall("#[0-9A-F]{6}", plots.STYLE["axes.prop_cycle"])[:4]
+    palette = re.findall("#[0-9A-F]{6}", str(plots.STYLE["axes.prop_cycle"]))[:4]
     assert [each.upper() for each in browser.evaluate(seen)] == [each.upper() for each in (*roles, *palette)]
     browser.open(file, width=390, height=844)
     assert browser.evaluate("document.documentElement.scrollWidth") <= 390

@@ -192,7 +192,7 @@ def test_a_solver_is_not_needed_without_states():
         (lambda: {"engine": Adaptive(), "substeps": 2}, "`substeps` must be left out beside an engine"),
         (lambda: {"engine": Adaptive(rtol=0.0)}, "`rtol` must be positive"),
         (lambda: {"engine": Adaptive(atol=-1.0)}, "`atol` must be positive"),
-        (lambda: {"engine": Adaptive("Tsit5")}, "`solver` must be a solver of diffrax, but is"),
+        (lambda: {"engine": Adaptive("Tsit5")}, "`solver` must be a solver of diffrax, but is"),  # type: ignore[arg-type]
         (lambda: {"engine": Exponential(dt=1e-3)}, "`engine` must have no step of its own on the rig"),
         (
             lambda: {"engine": Adaptive()},
