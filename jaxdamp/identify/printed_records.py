@@ -90,7 +90,7 @@ class Row:
         if "delay" in self.effects:
             (x, by_x), (v, by_v) = (delayed(values, delay / self.dt) for values in motions[0])
             motions = [(x, v), (by_x / self.dt, by_v / self.dt)]
-        first, *others = (Motion.refined(*each, self.dt, self.parts) for each in motions)
+        first, *others = (Motion.refined(x, v, self.dt, self.parts) for x, v in motions)
         parts, step = self.parts, self.dt / self.parts
         if "lag" in self.effects:
             first, *others = (each.at_parts() for each in (first, *others))
