@@ -4,6 +4,7 @@ import dataclasses
 import re
 from collections.abc import Callable
 from functools import cached_property
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -13,7 +14,7 @@ from jaxtyping import Array, PyTree
 
 from jaxdamp import _checks
 from jaxdamp.codegen import Program, Symbols, lower, symbols
-from jaxdamp.dampers import AbstractDamper, Condition, laws_inside
+from jaxdamp.dampers import AbstractDamper, laws_inside
 from jaxdamp.parameters import Domain, domain_of, modules_inside, with_values
 
 
@@ -59,7 +60,7 @@ def law_numbers(law: eqx.Module) -> list[LawNumber]:
     return numbers
 
 
-def _conditions(law: AbstractDamper) -> list[tuple[AbstractDamper, Condition]]:
+def _conditions(law: AbstractDamper) -> list[tuple[AbstractDamper, Any]]:
     """Every condition between parameters, with the law that it is about."""
     return [(inner, c) for _, inner in laws_inside(law) if inner.has_conditions() for c in inner.conditions()]
 
