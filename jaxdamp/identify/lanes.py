@@ -198,7 +198,7 @@ def _compared(
     fields = ("dt", "stroke", "velocity", "force", "weight", "number", "fixed", "temperature", "command", "cycle")
     rows = {name: jax.tree.map(lambda a: a[record][:, None], getattr(batch, name)) for name in fields}
 
-    def compared(y: Array, row: dict[str, Array], level: Array) -> dict[str, Array]:
+    def compared(y: Array, row: dict[str, PyTree], level: Array) -> dict[str, Array]:
         missed, drift = dataclasses.replace(batch, **row).missed_and_drift(free.build(coordinates.to_physical(y)))
         return {"missed": missed / level, "drift": drift[0]}
 

@@ -3,7 +3,7 @@
 import functools
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -39,9 +39,9 @@ def label_axis(axes: Axes, name: Literal["x", "y"], label: str, *, turns: bool =
         return
 
     class Ticks(MaxNLocator):
-        def tick_values(self, vmin: float, vmax: float) -> Sequence[float]:
+        def tick_values(self, vmin: float, vmax: float) -> Any:
             ends = sorted((factor * vmin, factor * vmax))
-            return np.sort(np.asarray(super().tick_values(*ends)) / factor).tolist()
+            return np.sort(np.asarray(super().tick_values(*ends)) / factor)
 
     axis.set_major_locator(Ticks(nbins="auto", steps=[1, 2, 2.5, 4, 5, 10]))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{round(factor * value, 9) + 0.0:g}".replace("-", "−")))
