@@ -70,10 +70,6 @@ def find_columns(table: RawTable, choice: Choice) -> tuple[dict[str, Column], tu
     A quantity that a record can do without, velocity, temperature or command, is left out where its column is
     doubtful, and a note says so, unless the caller asked for it.
 
-    Arguments:
-        table: the table read from a file.
-        choice: what the caller says about the columns.
-
     Returns:
         The column of each quantity, and notes.
 

@@ -172,12 +172,6 @@ def columns_of(
 ) -> list[RawColumn]:
     """The columns of rows of cells: numbers, what stands in their place, and text.
 
-    Arguments:
-        file: for messages.
-        numbers: number of the line of each row.
-        chunks: the rows, some at a time.
-        layout: which columns hold numbers.
-
     Raises:
         ValueError: a row of another width, or two decimal signs.
     """

@@ -174,14 +174,7 @@ class Fits(NamedTuple):
         self.work.attempts.troubles.extend(failed)
 
     def of_group(self, name: str, runs: BenchSet, held_out: BenchSet, later: Sequence[str]) -> None:
-        """Fit one group of records and write its folder, which has the name of the group.
-
-        Arguments:
-            name: of the group; empty if there is only one, which is written without a folder of its own.
-            runs: its records.
-            held_out: the records of all groups that are not fitted.
-            later: the groups that follow.
-        """
+        """Fit one group of records and write its folder, which has the name of the group."""
         screen = self.work.screen
         screen.say()
         if name:
@@ -222,15 +215,6 @@ def fit_laws(
     **options: Any,
 ) -> Fitted:
     """Fit the laws of these names on a test machine, one after the other. Ctrl-C keeps those that are finished.
-
-    Arguments:
-        screen: the terminal.
-        names: of the laws; those that suit the records if there are none.
-        runs: records to fit.
-        held_out: records to score on.
-        rig: effects of the test machine.
-        keep_bad: fit records that contradict each other together.
-        options: as in `identify.fit_each`.
 
     Raises:
         ValueError: records that contradict each other; not one law could be fitted.

@@ -59,26 +59,14 @@ class Job(NamedTuple):
 
     @contextlib.contextmanager
     def saving(self, title: str, missing: str = "the pictures and the report") -> Iterator[Path]:
-        """Write what is finished into the folder that this gives; it is put into place, and no `check` stops it.
-
-        Arguments:
-            title: of the stage.
-            missing: what is still to come.
-        """
+        """Write what is finished into the folder that this gives; it is put into place, and no `check` stops it."""
         interrupt.keep()
         with interrupt.saving(), self.screen.stage(title):
             yield self.results.draft
             self.results.publish(missing)
 
     def page(self, report: Callable[..., Report], *contents: Any, part: str = "", **more: Any) -> None:
-        """Draw the pictures and write the page.
-
-        Arguments:
-            report: makes the page.
-            contents: its arguments.
-            part: folder inside the results.
-            more: its further arguments.
-        """
+        """Draw the pictures and write the page."""
         with self.screen.stage("Pictures and report"):
             folder = self.results.draft / part
             folder.mkdir(exist_ok=True)
@@ -90,15 +78,7 @@ class Job(NamedTuple):
 def job(
     screen: Screen, command: str, output: Output, page: Path | None = None, *, resume: bool = False
 ) -> Iterator[Job]:
-    """The results of a command; at the end the terminal says what was written and what could not be made.
-
-    Arguments:
-        screen: the terminal.
-        command: its name.
-        output: the folder to write.
-        page: another place for the page.
-        resume: go on with what an interrupted run had finished.
-    """
+    """The results of a command; at the end the terminal says what was written and what could not be made."""
     target, screen.verbose = output.out or Path(f"jaxdamp-{command}"), output.verbose
     attempts = Attempts(interrupt.check, message)
     folder = results_folder(target, command, replace=output.replace, resume=resume)
@@ -111,11 +91,6 @@ def job(
 @contextlib.contextmanager
 def another_page(page: Path | None, target: Path, *, replace: bool = False) -> Iterator[None]:
     """A copy of the report of a results folder in another place, written when all is done.
-
-    Arguments:
-        page: the file to write; None for no copy.
-        target: the results folder.
-        replace: replace a file that is there.
 
     Raises:
         ValueError: the file is there already, or is a folder.

@@ -36,20 +36,7 @@ def fit_line(
     in_control: int | None,
     refused: Sequence[Refused],
 ) -> None:
-    """Fit one law to every damper of a line that is new since the last call, and chart its numbers.
-
-    Arguments:
-        screen: the terminal.
-        files: a folder tree, or a table of files.
-        each: what is a damper, as in `bench.read_dampers`.
-        law: name of the law.
-        rig: what the test machine adds.
-        reading: how the records are read and processed.
-        options: of the fits.
-        output: the folder to write; the fits are kept beside it, in a store of its name.
-        in_control: so many dampers at the beginning give the limits of control charts; None for no charts.
-        refused: options that say nothing of a line.
-    """
+    """Fit one law to every damper of a line that is new since the last call, and chart its numbers."""
     name = _checked(files, law, [*refused, *(Refused(n, True) for n in options if n not in _TAKEN)])
     dampers = bench.read_dampers(files[0], each=each, **reading.read.arguments()).process(**reading.processing())
     if in_control is not None:

@@ -39,14 +39,6 @@ def swept(
 ) -> tuple[Dataset, list[str]]:
     """The results of a sweep with what it warns of.
 
-    Arguments:
-        screen: the terminal.
-        ride: at each point.
-        axes: in SI.
-        how: options of `jaxdamp.sweep`.
-        file: where it keeps what is done.
-        part: of the blocks, such as "17/200"; all if left out.
-
     Raises:
         ValueError: a store of another sweep, with the options that differ.
     """

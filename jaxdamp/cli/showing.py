@@ -19,12 +19,7 @@ KEYS = ("units", "sign")
 
 @contextmanager
 def chosen(given: Mapping[str, Any], screen: Screen) -> Iterator[None]:
-    """Tables, pictures and CSV as the options say, then a file in this folder, then the file of the user.
-
-    Arguments:
-        given: the options of a command by name.
-        screen: where units and sign are said if they are not those of the library.
-    """
+    """Tables, pictures and CSV as the options say, then a file in this folder, then the file of the user."""
     stated = {key: given[f"show_{key}"] for key in KEYS if given.get(f"show_{key}")}
     sources = []
     for file in _files(given.get("files") or ()) if "show_units" in given else ():

@@ -84,10 +84,6 @@ def compiler_for(architecture: int) -> Compiler:
 def kernel(text: str, architecture: int) -> Kernel:
     """A text compiled for the GPUs of one architecture.
 
-    Arguments:
-        text: of the kernel.
-        architecture: such as 90, for sm_90.
-
     Raises:
         NotImplementedError: no NVRTC, or it refuses the text; the message holds what it says.
     """

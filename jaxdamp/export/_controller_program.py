@@ -241,13 +241,7 @@ def _decisions(state: ControllerState) -> Array:
 def program_of(
     law: AbstractDamper | AbstractVehicle, part: str, dtype: str = "float64"
 ) -> LawProgram | VehicleProgram | ControllerProgram:
-    """What is printed of a law, of a vehicle, or of the controller of a vehicle.
-
-    Arguments:
-        law: any law or vehicle.
-        part: "whole" or "controller".
-        dtype: the type of all numbers.
-    """
+    """What is printed of a law, of a vehicle, or of the controller of a vehicle."""
     _checks.one_of("part", part, ("whole", "controller"))
     if isinstance(law, Controlled):
         if part == "controller":

@@ -151,13 +151,7 @@ def _bar(axes: Axes, shown: _rides.Rides, row: int, name: str) -> None:
 
 
 def damper(panels: Sequence[Axes], shown: _rides.Rides, path: str) -> None:
-    """A damper before and after over mm/s: its force, its damping ratio, and the share of time at each velocity.
-
-    Arguments:
-        panels: one above the other, all over velocity; without a damping ratio two.
-        shown: the rides.
-        path: of its law.
-    """
+    """A damper before and after over mm/s: its force, its damping ratio, and the share of time at each velocity."""
     curves, *damping, shares = panels
     velocities = [_rides.damper_velocity(shown, path, number) for number in (0, 1)]
     known = [np.abs(v).max() for v in velocities if v is not None]

@@ -114,12 +114,7 @@ def third_octaves(
 ) -> None:
     """Weighted RMS in third octaves of spectra: the last one filled, the others as outlines.
 
-    Arguments:
-        axes: to draw in.
-        sides: label, look and spectrum (frequencies, densities) of each.
-        weighting: of ISO 2631-1.
-        unit: of the signal.
-        name: of the signal, in words.
+    Each side is a label, a look and a spectrum (frequencies, densities).
     """
     found = [np.stack([np.asarray(a) for a in metrics.third_octave_rms(*each, weighting)]) for *_, each in sides]
     known = np.all([np.isfinite(rms) for _, rms in found], axis=0)
@@ -144,11 +139,7 @@ def welch(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies and densities of a record, as `metrics.power_spectral_density`, which is compiled for each length.
 
-    Arguments:
-        values: the record.
-        dt: its interval [s].
-        size: samples of a segment; the whole record if left out.
-        window: of SciPy.
+    `size` is that of a segment, the whole record if left out.
     """
     from scipy import signal
 

@@ -87,13 +87,7 @@ def add_tuning(
 
 
 def add_baseline(report: Report, result: TuneResult[Any], baseline: AbstractVehicle) -> None:
-    """The section of a page on a tuning beside another vehicle: ride metrics on the same road, and damper curves.
-
-    Arguments:
-        report: the page.
-        result: of `tune.minimise`.
-        baseline: the other vehicle, of the same class.
-    """
+    """The section of a page on a tuning beside another vehicle: ride metrics on the same road, and damper curves."""
     _checks.instance("baseline", baseline, type(result.start), f"be a {type(result.start).__name__} as the tuned one")
     report.heading("Beside the baseline")
     if result.drive is not None:
