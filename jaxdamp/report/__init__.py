@@ -10,7 +10,6 @@
 
 from jaxdamp._guesses import answer_guesses
 from jaxdamp._tables import Column as Column, Table
-from jaxdamp.report.attempts import Attempts as Attempts
 from jaxdamp.report.benches import (
     add_evaluation as add_evaluation,
     baseline_table as baseline_table,
@@ -29,7 +28,7 @@ from jaxdamp.report.fits import (
     fitted_velocities as fitted_velocities,
     parameters_of as parameters_of,
 )
-from jaxdamp.report.page import Report
+from jaxdamp.report.page import Attempts as Attempts, Report
 from jaxdamp.report.records import (
     add_records as add_records,
     fitted_range_table as fitted_range_table,

@@ -8,8 +8,7 @@ from jaxdamp._tables import Cell, Column, Compared, Table, comparison_table, per
 from jaxdamp.bench import Evaluation, ForceVelocityTable, LimitCheck, Preflight, evaluate
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import predict_runs
-from jaxdamp.report.attempts import Attempts
-from jaxdamp.report.page import Report
+from jaxdamp.report.page import Attempts, Report
 from jaxdamp.report.records import add_records
 
 

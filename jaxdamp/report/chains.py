@@ -8,10 +8,9 @@ from jaxdamp import plots
 from jaxdamp.bench import BenchRun, Evaluation, Preflight
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Comparison
-from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.benches import add_evaluation, bench_verdict
 from jaxdamp.report.fits import add_fits, add_other_fits, fit_verdict
-from jaxdamp.report.page import Report
+from jaxdamp.report.page import Attempts, Report
 from jaxdamp.report.records import add_records
 from jaxdamp.report.rides import add_rides, notes_of, ride_verdict
 from jaxdamp.report.tunings import add_tuning

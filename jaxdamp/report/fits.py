@@ -13,8 +13,7 @@ from jaxdamp.bench import BenchRun, Preflight
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Band, Comparison, CrossValidation, FitResult, Rung, rounded, without_machine
 from jaxdamp.parameters import parameters
-from jaxdamp.report.attempts import Attempts
-from jaxdamp.report.page import Report
+from jaxdamp.report.page import Attempts, Report
 from jaxdamp.report.records import add_records, fitted_range_table
 
 

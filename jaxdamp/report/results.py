@@ -6,10 +6,9 @@ from pathlib import Path
 from jaxdamp._results import AbstractResult
 from jaxdamp.bench import Evaluation
 from jaxdamp.identify import Comparison, VehicleComparison, VehicleFit
-from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.benches import bench_report
 from jaxdamp.report.fits import fit_report
-from jaxdamp.report.page import Report
+from jaxdamp.report.page import Attempts, Report
 from jaxdamp.report.rides import ride_report
 from jaxdamp.report.tunings import tuning_report
 from jaxdamp.report.vehicle_fits import vehicle_comparison_report, vehicle_fit_report

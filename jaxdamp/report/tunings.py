@@ -10,8 +10,7 @@ import numpy as np
 from jaxdamp import _checks, plots
 from jaxdamp._tables import Compared, Table, comparison_table, percent_change
 from jaxdamp.parameters import get
-from jaxdamp.report.attempts import Attempts
-from jaxdamp.report.page import Report
+from jaxdamp.report.page import Attempts, Report
 from jaxdamp.simulation import Response, Ride
 from jaxdamp.tune import Rescore, TuneResult, damper_paths
 from jaxdamp.vehicles import AbstractVehicle

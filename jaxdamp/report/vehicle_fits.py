@@ -10,8 +10,7 @@ from jaxdamp._tables import Column, Table
 from jaxdamp.bench import RideRecord
 from jaxdamp.identify import VehicleComparison, VehicleFit, without_machine
 from jaxdamp.parameters import get
-from jaxdamp.report.attempts import Attempts
-from jaxdamp.report.page import Report
+from jaxdamp.report.page import Attempts, Report
 from jaxdamp.report.records import records_table
 
 
