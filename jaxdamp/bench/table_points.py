@@ -12,8 +12,7 @@ from jaxdamp._checks import ArgumentError, Setting
 from jaxdamp._files import natural_key
 from jaxdamp.bench.columns import Choice, column_of, find_one
 from jaxdamp.bench.headers import role_of, split_header
-from jaxdamp.bench.problems import Problems
-from jaxdamp.bench.raw import RawColumn, RawTable
+from jaxdamp.bench.raw import Problems, RawColumn, RawTable
 from jaxdamp.bench.settings import settings_in_name
 
 

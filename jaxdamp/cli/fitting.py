@@ -11,10 +11,9 @@ from jaxdamp.cli.console import Screen
 from jaxdamp.cli.interrupt import Interrupted
 from jaxdamp.cli.jobs import Job, Output, job, write_tables
 from jaxdamp.cli.limits import bounds_in_si
-from jaxdamp.cli.line_fitting import fit_line
+from jaxdamp.cli.line_fitting import Refused, fit_line, fit_table, records_of, through_points
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.records import Reading, decisions, grouped, law_names, split
-from jaxdamp.cli.table_fitting import Refused, fit_table, records_of, through_points
 from jaxdamp.cli.vehicle_words import read_law
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Comparison, CrossValidation, Failure, Rung

@@ -7,11 +7,10 @@ from typing import NamedTuple, TypeGuard, final
 import numpy as np
 
 from jaxdamp.codegen import _arrays
-from jaxdamp.codegen._jaxprs import Inner
+from jaxdamp.codegen._jaxprs import Inner, printing
 from jaxdamp.codegen._languages import FUNCTIONS, C
 from jaxdamp.codegen._loop_passes import Kept, kept_values, sums_of_products
 from jaxdamp.codegen._lowering import evaluated
-from jaxdamp.codegen._printing import printing
 from jaxdamp.codegen._program import (
     Atom,
     Atoms,

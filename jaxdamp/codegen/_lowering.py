@@ -10,8 +10,7 @@ from jax.extend.core import Literal, Var
 from jaxtyping import Array, PyTree
 
 from jaxdamp.codegen import _arrays, _elementwise
-from jaxdamp.codegen._jaxprs import Equation, Inner, equations, literal, opened, scan_sizes, traced
-from jaxdamp.codegen._printing import printing
+from jaxdamp.codegen._jaxprs import Equation, Inner, equations, literal, opened, printing, scan_sizes, traced
 from jaxdamp.codegen._program import (
     COUNTER,
     Assign,

@@ -15,8 +15,7 @@ from jaxdamp._types import Scalar
 from jaxdamp.codegen import Program, lower
 from jaxdamp.control import Controlled, ControlLoop, Flags, Sensors
 from jaxdamp.export._law_program import LawNumber
-from jaxdamp.export._prepared_program import Numbers, PreparedProgram
-from jaxdamp.export._vehicle_program import VehicleProgram
+from jaxdamp.export._vehicle_program import Numbers, PreparedProgram, VehicleProgram
 from jaxdamp.simulation import ControlledStepper, Controller, RoadInput, StepState
 from jaxdamp.vehicles import AbstractVehicle
 

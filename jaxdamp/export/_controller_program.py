@@ -18,8 +18,7 @@ from jaxdamp.control import Controlled, ControlLoop, ControlState, Sampler, Sign
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.export._controlled_program import Clock, ControlledProgram, names_in, with_first_commands, with_sensors
 from jaxdamp.export._law_program import LawProgram
-from jaxdamp.export._prepared_program import Numbers, PreparedProgram
-from jaxdamp.export._vehicle_program import VehicleProgram
+from jaxdamp.export._vehicle_program import Numbers, PreparedProgram, VehicleProgram
 from jaxdamp.parameters import parameters
 from jaxdamp.vehicles import AbstractVehicle, LinearMap
 

@@ -72,8 +72,10 @@ from jaxdamp.metrics.dissipation import (
 )
 from jaxdamp.metrics.dose import (
     estimated_vibration_dose_value,
+    max_transient_value,
     motion_sickness_dose,
     motion_sickness_percentage,
+    running_rms,
     vibration_dose_value,
 )
 from jaxdamp.metrics.fatigue import rainflow_cycles, spectral_damage, spectral_moments
@@ -89,7 +91,6 @@ from jaxdamp.metrics.roughness_index import (
     international_roughness_by_segment,
     international_roughness_index,
 )
-from jaxdamp.metrics.running import max_transient_value, running_rms
 from jaxdamp.metrics.spectrum import coherence, power_spectral_density, transmissibility
 from jaxdamp.metrics.statistics import STATISTICS, Gathered as Gathered, Reduction, Statistic, Term, percentile
 from jaxdamp.metrics.third_octaves import third_octave_rms
