@@ -39,6 +39,31 @@ class CFunction(NamedTuple):
     optimised: bool = True  # whether the compiler may optimise it; not if it is long and called rarely
 
 
+class Functions(NamedTuple):
+    """Makes the functions of a model."""
+
+    name: str  # before the name of everything
+    dtype: str  # the type of all numbers
+
+    def __call__(self, signature: str, program: Program, comment: str, *, optimised: bool = True) -> CFunction:
+        """The function of a signature such as "step p dt *m > c".
+
+        Its name, what it reads (p and dp are the parameters and their changes, a star stands before an array), and
+        behind the sign the arrays that it fills, without which it returns a number.
+        """
+        real = LANGUAGE.types[self.dtype]
+        (name, *reads), fills = (part.split() for part in f"{signature} > ".split(" > ")[:2])
+
+        def argument(word: str) -> str:
+            if word in ("p", "dp"):
+                return f"const {self.name}_parameters *{word}"
+            return f"const {real} {word}" if word.startswith("*") else f"{real} {word}"
+
+        arguments = ", ".join([*map(argument, reads), *(f"{real} *{each}" for each in fills)])
+        head = f"{'void' if fills else real} {self.name}_{name}({arguments})"
+        return CFunction(comment, head, program, fills, optimised)
+
+
 class CSource(NamedTuple):
     """What a header and a source are written from."""
 
@@ -143,56 +168,24 @@ DERIVATIVES = ("force", "advance", "state_rate")  # functions whose derivatives 
 
 def law_source(program: LawProgram, name: str, derivatives: Sequence[str] = ()) -> CSource:
     """Struct and functions of a law in C, with the derivatives of some of them."""
-    real, states = LANGUAGE.types[program.dtype], f"{name.upper()}_STATES"
-    p, dp, state = f"const {name}_parameters *p", f"const {name}_parameters *dp", f"const {real} *state"
-
-    def numbers(names: str) -> str:
-        return ", ".join(f"{real} {each}" for each in names.split())
-
+    states, c = f"{name.upper()}_STATES", Functions(name, program.dtype)
+    step = "The states after a step dt [s] over which the motion goes from (x0, v0) to (x1, v1)."
     functions = [
-        CFunction("The states at rest.", f"void {name}_init({p}, {real} *state)", program.initial_state, ["state"]),
-        CFunction("The force.", f"{real} {name}_force({p}, {numbers('x v')}, {state})", program.force),
-        CFunction(
-            "The states after a step dt [s] over which the motion goes from (x0, v0) to (x1, v1).",
-            f"void {name}_advance({p}, {numbers('x0 v0 x1 v1 dt')}, {real} *state)",
-            program.advance,
-            ["state"],
-        ),
-        CFunction(
-            "The time derivative of the states [1/s].",
-            f"void {name}_state_rate({p}, {numbers('x v')}, {state}, {real} *rate)",
-            program.state_rate,
-            ["rate"],
-        ),
+        c("init p > state", program.initial_state, "The states at rest."),
+        c("force p x v *state", program.force, "The force."),
+        c("advance p x0 v0 x1 v1 dt > state", program.advance, step),
+        c("state_rate p x v *state > rate", program.state_rate, "The time derivative of the states [1/s]."),
     ]
     if "force" in derivatives:
-        functions.append(
-            CFunction(
-                "The change of the force for small changes dp, dx, dv, dstate.",
-                f"{real} {name}_force_derivative({p}, {dp}, {numbers('x dx v dv')}, {state}, const {real} *dstate)",
-                program.force_derivative,
-            )
-        )
+        said = "The change of the force for small changes dp, dx, dv, dstate."
+        functions.append(c("force_derivative p dp x dx v dv *state *dstate", program.force_derivative, said))
     if "advance" in derivatives:
-        functions.append(
-            CFunction(
-                "The change of the states after a step: dstate before is replaced by that after.",
-                f"void {name}_advance_derivative({p}, {dp}, {numbers('x0 dx0 v0 dv0 x1 dx1 v1 dv1 dt')}, {state}, "
-                f"{real} *dstate)",
-                program.advance_derivative,
-                ["dstate"],
-            )
-        )
+        said = "The change of the states after a step: dstate before is replaced by that after."
+        read = "p dp x0 dx0 v0 dv0 x1 dx1 v1 dv1 dt *state"
+        functions.append(c(f"advance_derivative {read} > dstate", program.advance_derivative, said))
     if "state_rate" in derivatives:
-        functions.append(
-            CFunction(
-                "The change of the time derivative of the states.",
-                f"void {name}_state_rate_derivative({p}, {dp}, {numbers('x dx v dv')}, {state}, const {real} *dstate, "
-                f"{real} *drate)",
-                program.state_rate_derivative,
-                ["drate"],
-            )
-        )
+        said, read = "The change of the time derivative of the states.", "p dp x dx v dv *state *dstate"
+        functions.append(c(f"state_rate_derivative {read} > drate", program.state_rate_derivative, said))
     about = [
         repr(program.law),
         "",

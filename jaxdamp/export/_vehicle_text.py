@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from jaxdamp.export._c_text import LANGUAGE, CFunction, CSource
+from jaxdamp.export._c_text import CFunction, CSource, Functions
 from jaxdamp.export._controlled_program import ControlledProgram
 from jaxdamp.export._controller_program import ControllerProgram, Line
 from jaxdamp.export._law_program import identifier
@@ -30,74 +30,27 @@ def vehicle_source(program: VehicleProgram, name: str, derivatives: bool = False
 
 
 def _functions(program: VehicleProgram, name: str, derivatives: bool) -> list[CFunction]:
-    """The functions, with what each of them does."""
-    real = LANGUAGE.types[program.dtype]
+    """The functions, with what each of them does; of a vehicle without a controller those of its states too."""
+    c = Functions(name, program.dtype)
+    prepare = "What follows from the numbers and the step dt [s]: m. To be called after every change of them."
+    step = "A step later, while the road goes straight from (h0, r0) to (h1, r1)."
+    resume = "To be called after another prepare during a run; ratio: of the step to the one before."
     functions = [
-        CFunction(
-            "What follows from the numbers and the step dt [s]: m. To be called after every change of them.",
-            f"void {name}_prepare(const {name}_parameters *p, {real} dt, {real} *m)",
-            program.prepare,
-            ["m"],
-            optimised=False,
-        ),
-        CFunction(
-            "At rest in the static equilibrium on the road: c.",
-            f"void {name}_start({_arrays(real, 'm h r')}, {real} *c)",
-            program.start,
-            ["c"],
-        ),
-        CFunction(
-            "A step later, while the road goes straight from (h0, r0) to (h1, r1).",
-            f"void {name}_step({_arrays(real, 'm h0 r0 h1 r1')}, {real} *c)",
-            program.step,
-            ["c"],
-        ),
-        CFunction(
-            "To be called after another prepare during a run; ratio: of the step to the one before.",
-            f"void {name}_resume({_arrays(real, 'm h r')}, {real} ratio, {real} *c)",
-            program.resume,
-            ["c"],
-        ),
+        c("prepare p dt > m", program.prepare, prepare, optimised=False),
+        c("start *m *h *r > c", program.start, "At rest in the static equilibrium on the road: c."),
+        c("step *m *h0 *r0 *h1 *r1 > c", program.step, step),
+        c("resume *m *h *r ratio > c", program.resume, resume),
     ]
     if isinstance(program, ControlledProgram):
-        head = f"void {name}_outputs({_arrays(real, 'm c h r')}, {real} *y)"
-        return [*functions, CFunction("The channels y.", head, program.outputs, ["y"])]
-    return functions + _of_states(program, name, derivatives)
-
-
-def _of_states(program: VehicleProgram, name: str, derivatives: bool) -> list[CFunction]:
-    """The functions of the states of a vehicle without a controller."""
-    real = LANGUAGE.types[program.dtype]
-    p, dp = (f"const {name}_parameters *{each}" for each in ("p", "dp"))
-    functions = [
-        CFunction(
-            "The channels y in the states x, such as the first numbers of c.",
-            f"void {name}_outputs({_arrays(real, 'm x h r')}, {real} *y)",
-            program.outputs,
-            ["y"],
-        ),
-        CFunction(
-            "The time derivatives of the states x, for solvers of differential equations.",
-            f"void {name}_state_rate({_arrays(real, 'm x h r')}, {real} *rate)",
-            program.state_rate,
-            ["rate"],
-        ),
-    ]
+        return [*functions, c("outputs *m *c *h *r > y", program.outputs, "The channels y.")]
+    outputs = "The channels y in the states x, such as the first numbers of c."
+    rates = "The time derivatives of the states x, for solvers of differential equations."
+    functions.append(c("outputs *m *x *h *r > y", program.outputs, outputs))
+    functions.append(c("state_rate *m *x *h *r > rate", program.state_rate, rates))
     if derivatives:
-        functions.append(
-            CFunction(
-                "The changes drate and dy for small changes dp, dx, dh, dr.",
-                f"void {name}_derivative({p}, {dp}, {_arrays(real, 'x dx h dh r dr')}, {real} *drate, {real} *dy)",
-                program.derivative,
-                ["drate", "dy"],
-            )
-        )
+        changes = "The changes drate and dy for small changes dp, dx, dh, dr."
+        functions.append(c("derivative p dp *x *dx *h *dh *r *dr > drate dy", program.derivative, changes))
     return functions
-
-
-def _arrays(real: str, names: str) -> str:
-    """Arguments that a function reads."""
-    return ", ".join(f"const {real} *{each}" for each in names.split())
 
 
 def _about_instants(program: ControlledProgram | ControllerProgram, step: str, *lines: str) -> list[str]:
@@ -125,38 +78,15 @@ def _numbered(prefix: str, lines: Sequence[Channel] | Sequence[Line]) -> list[tu
 
 def controller_source(program: ControllerProgram, name: str) -> CSource:
     """Struct and functions of a controller in C."""
-    real, upper = LANGUAGE.types[program.dtype], name.upper()
+    upper, c = name.upper(), Functions(name, program.dtype)
+    prepare = "What follows from the numbers and the interval dt [s] of the steps: m. After every change of them."
+    resume = "After another prepare with another dt; ratio: of the interval to the one before."
     functions = [
-        CFunction(
-            "What follows from the numbers and the interval dt [s] of the steps: m. After every change of them.",
-            f"void {name}_prepare(const {name}_parameters *p, {real} dt, {real} *m)",
-            program.prepare,
-            ["m"],
-        ),
-        CFunction(
-            "The first sample: c.",
-            f"void {name}_start(const {real} *m, const {real} *u, {real} *c)",
-            program.start,
-            ["c"],
-        ),
-        CFunction(
-            "The next instant, dt later.",
-            f"void {name}_step({_arrays(real, 'm u')}, {real} *c)",
-            program.step,
-            ["c"],
-        ),
-        CFunction(
-            "After another prepare with another dt; ratio: of the interval to the one before.",
-            f"void {name}_resume({real} ratio, {real} *c)",
-            program.resume,
-            ["c"],
-        ),
-        CFunction(
-            "Commands and demands of the last sample: y.",
-            f"void {name}_outputs(const {real} *c, {real} *y)",
-            program.output,
-            ["y"],
-        ),
+        c("prepare p dt > m", program.prepare, prepare),
+        c("start *m *u > c", program.start, "The first sample: c."),
+        c("step *m *u > c", program.step, "The next instant, dt later."),
+        c("resume ratio > c", program.resume, resume),
+        c("outputs *c > y", program.output, "Commands and demands of the last sample: y."),
     ]
     sizes = {"INPUTS": len(program.inputs), "OUTPUTS": len(program.outputs)}
     sizes |= {"MATRICES": program.sizes["m"], "CARRY": program.sizes["c"]}
