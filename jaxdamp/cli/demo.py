@@ -45,33 +45,19 @@ def _true_law() -> AbstractDamper:
 
 @dataclass(frozen=True)
 class Scenario:
-    """What the demo does; every number of it stands here.
+    """What the demo does; every number of it stands here."""
 
-    Attributes:
-        law: the true damper.
-        true_name: the law of the ladder that has the same parameters.
-        laws: the laws to fit.
-        tests: the bench programme, paper 000 Table I.
-        held_out: pattern of the records that are not fitted, as in Fig. 8 of the paper.
-        force_noise: of the bench [N].
-        stroke_noise: of the bench [m].
-        duration: of the rides [s].
-        tyre_load: factor by which the tuning may raise the RMS variation of the tyre load.
-        fresh_roads: largest number of roads on which the tuned car is tried that the tuning has not seen.
-        seed: of all noise and roads.
-    """
-
-    law: AbstractDamper = field(default_factory=_true_law)
-    true_name: str = "besinger_series_spring"
+    law: AbstractDamper = field(default_factory=_true_law)  # the true damper
+    true_name: str = "besinger_series_spring"  # the law of the ladder that has the same parameters
     laws: tuple[str, ...] = ("linear", "power_law", "segmented_polynomial", "besinger", "besinger_series_spring")
     tests: tuple[SineTest, ...] = field(default_factory=bench.programmes.paper_000_table_1)
-    held_out: str = "30mm_*"
-    force_noise: float = 20.0
-    stroke_noise: float = 1e-5
-    duration: float = 10.0
-    tyre_load: float = 1.1
-    fresh_roads: int = 32
-    seed: int = 0
+    held_out: str = "30mm_*"  # pattern of the records that are not fitted, as in Fig. 8 of the paper
+    force_noise: float = 20.0  # of the bench [N]
+    stroke_noise: float = 1e-5  # of the bench [m]
+    duration: float = 10.0  # of the rides [s]
+    tyre_load: float = 1.1  # factor by which the tuning may raise the RMS variation of the tyre load
+    fresh_roads: int = 32  # largest number of roads on which the tuned car is tried that the tuning has not seen
+    seed: int = 0  # of all noise and roads
 
 
 def demo(screen: Screen, *, seed: int = 0, output: Output) -> None:

@@ -11,7 +11,7 @@ from jaxdamp.cli.console import Screen
 from jaxdamp.cli.interrupt import Interrupted
 from jaxdamp.cli.jobs import Job, Output, job, write_tables
 from jaxdamp.cli.limits import bounds_in_si
-from jaxdamp.cli.line_fitting import Refused, fit_line, fit_table, records_of, through_points
+from jaxdamp.cli.line_fitting import fit_line, fit_table, records_of, through_points
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.records import Reading, decisions, grouped, law_names, split
 from jaxdamp.cli.vehicle_words import read_law
@@ -125,9 +125,9 @@ def fit(
         Fits(work, names, options, found, remarks, cross_validate, beside).of_all(groups, held)
 
 
-def _given(**options: object) -> list[Refused]:
-    """Options that a kind of fit refuses if they are given."""
-    return [Refused(name, bool(value)) for name, value in options.items()]
+def _given(**options: object) -> list[str]:
+    """The options among these that are given."""
+    return [name for name, value in options.items() if value]
 
 
 def _options(how: Call, rig: Sequence[str]) -> dict[str, Any]:

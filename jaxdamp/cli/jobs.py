@@ -1,6 +1,7 @@
 """What the commands share between their start and their end: where they write, pictures, warnings of rides."""
 
 import contextlib
+import json
 import shutil
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -8,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from jaxdamp._tables import Table
+from jaxdamp._tables import Contents, Table
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.application import command_line
 from jaxdamp.cli.console import Screen
@@ -45,17 +46,11 @@ class Output:
 
 
 class Job(NamedTuple):
-    """A command at work.
+    """A command at work."""
 
-    Attributes:
-        screen: the terminal.
-        results: the folder that is written.
-        attempts: parts of the work that may fail by themselves.
-    """
-
-    screen: Screen
-    results: Results
-    attempts: Attempts
+    screen: Screen  # the terminal
+    results: Results  # the folder that is written
+    attempts: Attempts  # parts of the work that may fail by themselves
 
     @contextlib.contextmanager
     def saving(self, title: str, missing: str = "the pictures and the report") -> Iterator[Path]:
@@ -109,6 +104,11 @@ def write_tables(folder: Path, tables: Mapping[str, Table]) -> None:
     folder.mkdir(exist_ok=True)
     for name, table in tables.items():
         (folder / f"{name}.csv").write_text(table.to_csv(), encoding="utf-8")
+
+
+def write_json(file: Path, contents: Contents) -> None:
+    """Plain data as JSON."""
+    file.write_text(json.dumps(contents, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
 @contextlib.contextmanager

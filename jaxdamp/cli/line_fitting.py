@@ -3,7 +3,6 @@
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 from jaxdamp import _checks, bench, dampers, export, identify
 from jaxdamp._checks import ArgumentError
@@ -21,13 +20,6 @@ from jaxdamp.rig import Rig
 
 
 THROUGH_POINTS = {"all": dampers.Table, "table": dampers.Table, "spline_table": dampers.SplineTable}
-
-
-class Refused(NamedTuple):
-    """An option that says nothing of a table whose laws go through its points."""
-
-    name: str
-    given: bool
 
 
 def through_points(law: Sequence[str]) -> type[dampers.Table] | type[dampers.SplineTable] | None:
@@ -50,12 +42,11 @@ def fit_table(
     table: ForceVelocityTable,
     kind: type[dampers.Table] | type[dampers.SplineTable],
     output: Output,
-    refused: Sequence[Refused],
+    refused: Sequence[str],
 ) -> None:
     """Write the laws through the points of a table: of each setting, and of all as one law of the setting."""
     for option in refused:
-        if option.given:
-            _checks.refuse(option.name, "be left out with a force-velocity table", "given", "Or fit laws with --law.")
+        _checks.refuse(option, "be left out with a force-velocity table", "given", "Or fit laws with --law.")
     with job(screen, "fit", output) as work:
         screen.table(table.table())
         screen.points(table.notes)
@@ -110,10 +101,10 @@ def fit_line(
     output: Output,
     *,
     in_control: int | None,
-    refused: Sequence[Refused],
+    refused: Sequence[str],
 ) -> None:
     """Fit one law to every damper of a line that is new since the last call, and chart its numbers."""
-    name = _checked(files, law, [*refused, *(Refused(n, True) for n in options if n not in _TAKEN)])
+    name = _checked(files, law, [*refused, *(option for option in options if option not in _TAKEN)])
     dampers = bench.read_dampers(files[0], each=each, **reading.read.arguments()).process(**reading.processing())
     if in_control is not None:
         _charts({"place": range(len(dampers))}, in_control)  # refuses too few or too many before anything is fitted
@@ -140,11 +131,10 @@ def fit_line(
         work.page(result_report, results[-1])
 
 
-def _checked(files: Sequence[Path], law: Sequence[str], refused: Sequence[Refused]) -> str:
+def _checked(files: Sequence[Path], law: Sequence[str], refused: Sequence[str]) -> str:
     """The name of the law; what a line does not take is refused."""
     for option in refused:
-        if option.given:
-            _checks.refuse(option.name, "be left out where each damper is fitted", "given", "Leave out one of them.")
+        _checks.refuse(option, "be left out where each damper is fitted", "given", "Leave out one of them.")
     names = law_names(law)
     if len(names) != 1:
         _checks.refuse("law", "be one law for all dampers", ", ".join(names) or "left out", 'See "jaxdamp laws".')

@@ -18,7 +18,7 @@ from jaxdamp.blocks import command_of, note_command, stored_blocks
 from jaxdamp.cli import interrupt, resuming
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.controlling import Controlling
-from jaxdamp.cli.jobs import Output, job, write_tables
+from jaxdamp.cli.jobs import Output, job, write_json, write_tables
 from jaxdamp.cli.limits import axes_in_si, bounds_in_si, in_si
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.riding import Driving, beyond_vehicles, unusual
@@ -213,8 +213,7 @@ def write_tuning(folder: Path, result: TuneResult[Any]) -> None:
     if result.combinations is not None:
         tables["combinations"] = result.combinations.table()
     write_tables(folder, tables)
-    text = json.dumps(result.to_dict(), indent=1, ensure_ascii=False) + "\n"
-    (folder / "tuning.json").write_text(text, encoding="utf-8")
+    write_json(folder / "tuning.json", result.to_dict())
 
 
 def sweep_command(
