@@ -12,7 +12,7 @@ from typer.core import TyperCommand, TyperGroup
 
 
 COMMANDS = {  # along the chain from records to a damper: name and function
-    "demo": "cli.demo.demo",
+    "demo": "cli.chaining.demo",
     "bench": "cli.benching.bench_command",
     "fit": "cli.fitting.fit",
     "fit-vehicle": "cli.vehicle_fitting.fit_vehicle",

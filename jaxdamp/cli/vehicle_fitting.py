@@ -17,7 +17,7 @@ from jaxdamp.cli.records import decisions
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, write_laws
 from jaxdamp.dampers import CoulombFriction
 from jaxdamp.identify import Failure, VehicleComparison, VehicleFit, VehicleRung
-from jaxdamp.report import ride_records_table, vehicle_comparison_report, vehicle_fit_report
+from jaxdamp.report import failure_sentences, ride_records_table, vehicle_comparison_report, vehicle_fit_report
 from jaxdamp.rig import Rig, Sensor
 from jaxdamp.tune import damper_paths
 from jaxdamp.vehicles import AbstractVehicle, Guide, Guided
@@ -110,7 +110,7 @@ def _compared(
     comparison = VehicleComparison.of(outcomes)
     screen.answer(*comparison.verdict)
     screen.table(comparison.table(), mark=comparison.best.name)
-    screen.points([f"{failure.name} could not be fitted. {failure.reason}" for failure in comparison.failed])
+    screen.points(failure_sentences(comparison))
     return comparison
 
 

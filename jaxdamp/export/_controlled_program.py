@@ -79,10 +79,6 @@ class ControlledProgram(VehicleProgram):
 
     Behind the states the carry c has what the controller carries, and as its last number the steps since a sample.
 
-    Arguments:
-        vehicle: the controlled vehicle.
-        dtype: as in `VehicleProgram`.
-
     Attributes:
         delay: from a sample to its command [s].
     """

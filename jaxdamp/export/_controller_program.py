@@ -111,10 +111,6 @@ class ControllerProgram(PreparedProgram):
     Noise and errors of sensors are no part of it, nor is the delay; the sensors' filter is. The last number of the
     carry c are the steps since a sample.
 
-    Arguments:
-        vehicle: the controlled vehicle.
-        dtype: as in `VehicleProgram`.
-
     Attributes:
         dampers: names of those that it commands.
         inputs: what it needs to be given, in the order of the array u.

@@ -14,8 +14,7 @@ from jaxtyping import Array, PyTree
 
 from jaxdamp._vectors import MemoryLayout, scalars
 from jaxdamp.codegen import Constant, Program, Symbols, Variable, lower, printing, symbols
-from jaxdamp.export._law_program import law_numbers
-from jaxdamp.parameters import with_values
+from jaxdamp.export._law_program import AbstractProgram
 from jaxdamp.simulation import Equations, Exponential, RoadInput, settled
 from jaxdamp.vehicles import AbstractVehicle, Channel, ChannelKind
 
@@ -55,25 +54,16 @@ class FlatTree:
         return [Symbols(part.reshape(shape), dtype) for part, shape in zip(parts, self._shapes, strict=True)]
 
 
-class PreparedProgram:
+class PreparedProgram(AbstractProgram):
     """A vehicle, or a part of it, that goes from step to step by functions that can be printed.
 
     What follows from the parameters and the step alone lies in an array m, which `prepare` fills. What a run carries
     from step to step is an array c.
-
-    Arguments:
-        vehicle: any vehicle.
-        dtype: the type of all numbers, "float64" or "float32".
-        member: what the language writes between `p` and the name of a number: "->" in C, "." in JavaScript.
-
-    Attributes:
-        vehicle: the vehicle.
-        numbers: its parameters and settings.
     """
 
     def __init__(self, vehicle: AbstractVehicle, dtype: str = "float64", member: str = "->") -> None:
-        self.vehicle, self.dtype, self.member = vehicle, dtype, member
-        self.numbers = law_numbers(vehicle)
+        super().__init__(vehicle, dtype, member)
+        self.vehicle = vehicle
 
     @abstractmethod
     def _prepared(self, values: Numbers, dt: Array) -> PyTree:
@@ -141,12 +131,7 @@ class PreparedProgram:
 
     def vehicle_of(self, values: Numbers) -> AbstractVehicle:
         """The vehicle with other numbers, in the order of `numbers`."""
-        vehicle = jax.tree.map(lambda a: jnp.asarray(a, self.dtype) if eqx.is_inexact_array(a) else a, self.vehicle)
-        return with_values(vehicle, {n.path: value for n, value in zip(self.numbers, values, strict=True)})
-
-    def values(self, owner: str = "p") -> PyTree[Symbols]:
-        """All numbers, as members of an object of the program."""
-        return [symbols(f"{owner}{self.member}{n.name}", n.value.shape, self.dtype) for n in self.numbers]
+        return self._with_numbers(values)
 
     @property
     def _carried(self) -> list[Symbols]:
@@ -166,20 +151,12 @@ class PreparedProgram:
             shapes = jax.tree.map(shape, arguments, is_leaf=lambda leaf: isinstance(leaf, Symbols))
             return FlatTree(eqx.filter_eval_shape(function, *shapes))
 
-    def _symbols(self, name: str) -> Symbols:
-        return symbols(name, (), self.dtype)
-
 
 class VehicleProgram(PreparedProgram):
     """A vehicle whose functions can be printed: those of a run of `simulate`, and those of solvers of other programs.
 
     The first numbers of the carry c are the states x of the equations of motion: q, q̇ and the states of the elements.
     The road is the heights h [m] under the wheels and their rates r [m/s].
-
-    Arguments:
-        vehicle: any vehicle.
-        dtype: the type of all numbers, "float64" or "float32".
-        member: what the language writes between `p` and the name of a number: "->" in C, "." in JavaScript.
 
     Attributes:
         wheels: their number.

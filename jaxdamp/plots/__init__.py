@@ -7,11 +7,16 @@ touches pyplot or its global state, and matplotlib is loaded by the first call o
 
 from jaxdamp.plots._style import ROLES, STYLE
 from jaxdamp.plots.animation import animation as animation
-from jaxdamp.plots.cards import law_card
-from jaxdamp.plots.curves import force_velocity, force_velocity_family as force_velocity_family
+from jaxdamp.plots.curves import force_velocity, force_velocity_family as force_velocity_family, law_card
 from jaxdamp.plots.damper_sheet import damper_sheet as damper_sheet
 from jaxdamp.plots.damping import damping_ratio
-from jaxdamp.plots.errors import cross_validation as cross_validation, ladder
+from jaxdamp.plots.errors import (
+    cross_validation as cross_validation,
+    experiment as experiment,
+    ladder,
+    profile as profile,
+    training_history as training_history,
+)
 from jaxdamp.plots.evaluation import (
     evaluation,
     gas_and_friction as gas_and_friction,
@@ -32,14 +37,13 @@ from jaxdamp.plots.many_values import (
     many_fits as many_fits,
     posterior as posterior,
     rescore as rescore,
+    sweep_summary as sweep_summary,
     targets as targets,
 )
 from jaxdamp.plots.preflight import preflight
-from jaxdamp.plots.profiles import experiment as experiment, profile as profile, training_history as training_history
 from jaxdamp.plots.ride_sheet import ride_sheet as ride_sheet
 from jaxdamp.plots.rides import damper_use, ride
 from jaxdamp.plots.sensitivities import record_sensitivity as record_sensitivity, sensitivity, valving
-from jaxdamp.plots.sweep_summaries import sweep_summary as sweep_summary
 from jaxdamp.plots.sweeps import sweep
 from jaxdamp.plots.tunings import pareto, tuning
 

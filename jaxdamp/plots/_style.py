@@ -37,7 +37,7 @@ DASHES = ("-", "--", "-.", ":")
 BLACK = "#222222"
 GREY = "#6B6B6B"
 SHADE = "#F5EEDF"  # behind what is extrapolated
-GOOD, DOUBT, BAD = "#00755A", "#9A5B00", "#B00020"  # of a verdict; what is beyond a limit is BAD
+GOOD, BAD = "#00755A", "#B00020"  # of a verdict; what is beyond a limit is BAD
 # What a line means, the same in every picture, on every page and in notebooks.
 MEASURED: Look = {"color": GREY, "linestyle": "-"}
 BEFORE: Look = {"color": BLACK, "linestyle": "--", "linewidth": 1.3, "zorder": 2.5}
@@ -48,7 +48,6 @@ PRESENT: Look = {"marker": "o", "color": BLACK, "markersize": 8.0, "markeredgeco
 BEST: Look = {"marker": "*", "color": COLOURS[0], "markersize": 14.0}
 LIMIT: Look = {"color": BAD, "linestyle": "--", "linewidth": 1.2}
 REBOUND, COMPRESSION = COLOURS[0], COLOURS[1]  # where both are on one axis
-FRONT, REAR = "-", "-."
 ROLES: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     {
         "measured": MEASURED,
