@@ -94,7 +94,7 @@ Atoms: TypeAlias = npt.NDArray[np.object_]  # an array of JAX: one atom for each
 COUNTER = "int32"  # the type of what counts the rounds of a loop
 
 
-def array_of(shape: tuple[int, ...], entry: Callable[[tuple[int, ...]], Any]) -> Atoms:
+def array_of(shape: tuple[int, ...], entry: Callable[[tuple[int, ...]], object]) -> Atoms:
     """An array of what a function gives at each place."""
     result = np.empty(shape, object)
     for index in np.ndindex(*shape):
