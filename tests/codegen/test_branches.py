@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from jaxdamp._limits import ramp
 from jaxdamp._root import increasing_root
-from jaxdamp.codegen import Signature, library, with_slopes
+from jaxdamp.codegen import C, Signature, library, with_slopes
 from jaxdamp.codegen._branches import in_branches
 from jaxdamp.codegen._program import Branch, Declare, Define, Variable
 
@@ -76,6 +76,15 @@ def test_values_and_derivatives_are_those_of_jax(name) -> None:
         call(*(ctypes.c_void_p(a.ctypes.data) for a in (p, p[1:], unit, y, dy)))
         assert_allclose(y[0], value, rtol=1e-12, atol=1e-14)
         assert_allclose(dy[0], slope, rtol=1e-11, atol=1e-13)
+
+
+@pytest.mark.parametrize("body", [[], [Define(Variable("t", "float64"), "exp", (Variable("x", "float64"),))]])
+def test_a_side_without_statements_is_not_written(body) -> None:
+    case = Variable("case", "bool")
+    lines = ["const double t = exp(x);"] if body else []
+    for bodies, test in (([[], body], "if (case) {"), ([body, []], "if (!case) {")):
+        text = [line.strip() for line in C().lines([Branch(case, bodies)], 0)]
+        assert text == ([test, *lines, "}"] if body else [])
 
 
 def number(name, dtype="float64"):
