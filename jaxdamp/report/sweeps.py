@@ -8,8 +8,7 @@ from jaxdamp import plots
 from jaxdamp._tables import percent_change, typeset_unit
 from jaxdamp._types import DataArray, Dataset, ScalarLike
 from jaxdamp._words import path_words
-from jaxdamp.report.attempts import Attempts
-from jaxdamp.report.page import Report
+from jaxdamp.report.page import Attempts, Report
 from jaxdamp.tune import Limits, limit_spans
 
 
