@@ -29,7 +29,18 @@ TOP = len(STOREYS) - 1
 DRAWS_ITSELF = {(own, "plots") for own in ("metrics", "rig", "roads", "vehicles", *STOREYS[4], *STOREYS[5])}
 DRAWS_ITSELF |= {("_results", "plots"), ("_results", "report")}  # and writes itself: `.report(path)`
 # Known only to someone who asks for them: importing the package loads none.
-LATE = ["matplotlib", "xarray", "pint", "typer", "rich", "pandas", "scipy.optimize", "scipy.signal", "scipy.io"]
+LATE = [
+    "matplotlib",
+    "optax",
+    "xarray",
+    "pint",
+    "typer",
+    "rich",
+    "pandas",
+    "scipy.optimize",
+    "scipy.signal",
+    "scipy.io",
+]
 
 
 def storey(part: str) -> int:

@@ -10,9 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jaxdamp.bench.headers import role_of
 from jaxdamp.bench.raw import RawColumn
 from jaxdamp.bench.stamps import is_stamp
-from jaxdamp.bench.units import is_unit
+from jaxdamp.bench.units import is_unit, is_usual
 
 
 DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "white space", "|": "vertical bar"}
@@ -157,7 +158,8 @@ def header_of(rows: Rows, layout: Layout) -> Header | None:
 def _units(cells: Sequence[str]) -> tuple[str, ...]:
     """The units in a row that holds nothing else; empty if it holds something else."""
     bare = [cell.strip("[](){} ") for cell in cells]
-    if not any(bare) or not all(unit in ("", "-") or is_unit(unit) for unit in bare):
+    names = (cell for cell, unit in zip(cells, bare, strict=True) if not is_usual(unit) and role_of(cell))
+    if not any(bare) or any(names) or not all(unit in ("", "-") or is_unit(unit) for unit in bare):
         return ()
     return tuple("" if unit == "-" else unit for unit in bare)
 

@@ -30,6 +30,7 @@ _KNOWN = {
     "stroke": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
     "velocity": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "in/s": 0.0254},
     "force": {"N": 1.0, "daN": 10.0, "kN": 1e3},
+    "signal": {"V": 1.0, "mV": 1e-3},
 }
 GAINS = {
     "time": "0.001 s",
@@ -129,10 +130,18 @@ def conversion(role: str, written: str) -> Conversion | None:
     return Conversion(text, float(two - zero) / 2, float(zero))
 
 
+def is_usual(written: str) -> bool:
+    """Whether this text is a unit of the tables here, for which pint, which takes long to load, is not asked."""
+    tables = (*USUAL.values(), *_KNOWN.values(), *_WRITTEN.values())
+    return any(written in units or written.lower() in units for units in tables)
+
+
 @lru_cache(maxsize=256)
 def is_unit(written: str) -> bool:
     """Whether this text is a unit of any quantity that a record has, or of a sensor's signal."""
-    return any(conversion(role, written) is not None for role in SI) or ratio(written, "V") is not None
+    if is_usual(written) or any(conversion(role, written) is not None for role in SI):
+        return True
+    return ratio(written, "V") is not None
 
 
 @lru_cache(maxsize=256)
@@ -148,6 +157,9 @@ def ratio(written: str, other: str) -> float | None:
     """
     if written.strip().lower() == other.strip().lower():
         return 1.0
+    one, two = (next((units for units in _KNOWN.values() if text in units), {}) for text in (written, other))
+    if one and two:
+        return one[written] / two[other] if one is two else None
     registry = _registry()
     try:
         return float(registry.Quantity(1.0, written.strip()).to(other.strip()).magnitude)

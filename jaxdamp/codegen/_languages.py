@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple, NoReturn
 
+from jaxdamp.codegen._branches import in_branches
 from jaxdamp.codegen._program import (
     Assign,
     Atom,
@@ -73,7 +74,9 @@ class AbstractLanguage(ABC):
 
     def function(self, printed: PrintedFunction) -> str:
         """The text of a function."""
-        lines = [f"{printed.head} {{", *self._unused(printed), *self.lines(printed.statements, 1)]
+        results = names([*(value for _, value in printed.outputs), printed.returned])
+        statements = in_branches(printed.statements, (), results)
+        lines = [f"{printed.head} {{", *self._unused(printed), *self.lines(statements, 1)]
         targets = {text for text, _ in printed.outputs}
         after: list[str] = []
         for number, (text, value) in enumerate(printed.outputs):
@@ -106,11 +109,19 @@ class AbstractLanguage(ABC):
     def _branch(self, branch: Branch, depth: int) -> Iterator[str]:
         """Cases below the first are the first, those above the last are the last, as JAX limits them."""
         space, case = "    " * depth, self.atom(branch.case)
-        for number, body in enumerate(branch.bodies):
-            test = f"if ({case} {'<=' if number == 0 else '=='} {number}) " if number < len(branch.bodies) - 1 else ""
+        last = len(branch.bodies) - 1
+        cases = [
+            (f"if ({case} {'==' if i else '<='} {i}) " if i < last else "", b) for i, b in enumerate(branch.bodies)
+        ]
+        if branch.case.dtype == "bool" and last == 1:
+            no, yes = branch.bodies
+            cases = [(f"if ({case}) ", yes), ("", no)] if yes else [(f"if (!{case}) ", no), ("", yes)]
+            cases = [each for each in cases if each[1]]
+        for number, (test, body) in enumerate(cases):
             yield f"{space}{'} else ' if number else ''}{test}{{"
             yield from self.lines(body, depth + 1)
-        yield f"{space}}}"
+        if cases:
+            yield f"{space}}}"
 
     def _line(self, statement: Statement) -> str:
         if isinstance(statement, Define):

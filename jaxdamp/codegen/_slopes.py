@@ -8,6 +8,7 @@ import jax
 import numpy as np
 from jaxtyping import Array, PyTree
 
+from jaxdamp.codegen._branches import in_branches
 from jaxdamp.codegen._languages import C
 from jaxdamp.codegen._lowering import Program, Symbols, lower, symbols
 from jaxdamp.codegen._program import Atom, Branch, Define, Leave, Loop, Statement, Variable, names, operands_of
@@ -98,6 +99,7 @@ def _text(signature: Signature, program: Program, numbers: set[str], of_numbers:
     used = names([*value, *slope]).union(*map(_reads, once), *map(_reads, lane))
     if names(value) & set().union(*map(_writes, lane)):
         raise NotImplementedError("A value is computed together with its derivatives.")
+    once = in_branches(once, lane, names([*value, *slope]))
     stored = [s.target for s in before if s.target.name in used]
     stored_lane = [s.target for s in before_lane if s.target.name in used]
     c, name = C(), signature.name

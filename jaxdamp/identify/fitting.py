@@ -277,9 +277,13 @@ def _solve_linear(problem: Problem) -> Solution:
     free, coordinates = problem.free, problem.coordinates
     begin = np.asarray(free.values)
     printed = evaluator(free, problem.residuals) if begin.dtype == np.float64 else None
-    pair = printed(begin) if printed else linearised(free, free.values, problem.residuals)
-    residual, jacobian = map(np.asarray, pair)
-    residual, jacobian = problem.anchored(begin, residual, jacobian)
+    if printed is None:
+        residual, jacobian = map(np.asarray, linearised(free, free.values, problem.residuals))
+        whole = np.concatenate([jacobian, residual[:, None]], axis=1)
+    else:
+        whole = printed(begin)
+    whole = np.concatenate([whole, problem.anchor_rows(begin)])
+    residual, jacobian = whole[:, -1], whole[:, :-1]
     norms = np.linalg.norm(jacobian, axis=0)
     unseen = norms <= UNSEEN * norms.max()  # no sample shows these numbers: they keep their start
     scale, jacobian = np.where(unseen, 1.0, norms), np.where(unseen, 0.0, jacobian)

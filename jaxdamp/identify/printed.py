@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float, Int, PyTree
 
 from jaxdamp._traced import is_traced
+from jaxdamp._triangles import triangle
 from jaxdamp.dampers import laws_inside
 from jaxdamp.identify.model import Model, starts_in
 from jaxdamp.identify.printed_law import PrintedLaw, Record, numbers_on_rig, plain_rig, printed_law, say
@@ -126,14 +127,16 @@ class Evaluator:
     size: int
     free: int
 
-    def __call__(
-        self, values: Float[np.ndarray, " free"]
-    ) -> tuple[Float[np.ndarray, " samples"], Float[np.ndarray, "samples free"]]:
-        """Weighted residual and its Jacobian."""
+    def __call__(self, values: Float[np.ndarray, " free"]) -> Float[np.ndarray, "samples columns"]:
+        """The Jacobian of the weighted residual, which is the last column."""
         out = np.zeros((self.size, self.free + 1))
         for place, record, p, taken in self.rows:
             self.law.linearise(self._at(p, taken, values), record, self._columns(taken), out[place:])
-        return out[:, -1], out[:, :-1]
+        return out
+
+    def triangle(self, out: Float[np.ndarray, "samples columns"]) -> Float[np.ndarray, "rows columns"]:
+        """Rows with the same products of columns: the triangles of the records, without samples after the last used."""
+        return np.concatenate([triangle(out[place : place + record.used]) for place, record, _, _ in self.rows])
 
     def margins(
         self, values: Float[np.ndarray, " free"]

@@ -217,17 +217,12 @@ class Problem(NamedTuple):
         parts = (part.reweighted(own) for part, own in zip(self.residuals, factors, strict=True))
         return self._replace(residuals=tuple(parts))
 
-    def anchored(
-        self,
-        values: Float[np.ndarray, " free"],
-        residual: Float[np.ndarray, " samples"],
-        jacobian: Float[np.ndarray, "samples free"],
-    ) -> tuple[Float[np.ndarray, " rows"], Float[np.ndarray, "rows free"]]:
-        """Residual and Jacobian at these values, with a row for each number that has an anchor."""
+    def anchor_rows(self, values: Float[np.ndarray, " free"]) -> Float[np.ndarray, "rows columns"]:
+        """The Jacobian with the residual as last column of the numbers that have an anchor, none if there is none."""
         if self.anchor is None:
-            return residual, jacobian
+            return np.zeros((0, values.size + 1))
         at, weight = self.anchor
-        return np.concatenate([residual, weight * (values - at)]), np.concatenate([jacobian, np.diag(weight)])
+        return np.concatenate([np.diag(weight), (weight * (values - at))[:, None]], axis=1)
 
     def is_rounding(self, squares: float) -> bool:
         """Whether a sum of squares is so small that it consists of rounding errors, not of noise."""

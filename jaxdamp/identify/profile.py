@@ -16,13 +16,14 @@ from jaxdamp._tables import Column, Table, plain
 from jaxdamp.dampers import keeps_conditions
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.propagation import Evidence
-from jaxdamp.identify.search import SearchEnd, search
+from jaxdamp.identify.search import SearchEnd, Searches
 from jaxdamp.solve import BoundedLevenbergMarquardt
 
 
 STEPS = 15  # of each search; an incomplete search makes an error smaller, never larger
-LOOSE = BoundedLevenbergMarquardt(tolerance=0.1)  # standard errors: 0.01 in chi-square
-MOST_STEPS = 250  # of all searches together; parameters after that have their linear errors
+LOOSE = 0.3  # standard errors: 0.1 in chi-square
+PATIENCE = 4  # points tried without such a decrease: near kinks more is predicted than comes true
+MOST_STEPS = 400  # of all searches together; parameters after that have their linear errors
 CHI_SQUARE = 9.0  # increase up to which a moved parameter still fits: three standard errors
 GROWTH = 4.0  # of the distance, from one step to the next
 CURVE_STEPS = 60  # of each search
@@ -58,33 +59,40 @@ def profile(
     d if there is hardly any increase.
     """
     wide, open_ended, left = errors.copy(), np.zeros(errors.shape, bool), MOST_STEPS
+    most = found.squares + CHI_SQUARE * variance  # the largest sum of squares of a parameter that still fits
+    level = float(np.sqrt(variance * found.residual.size / most))  # of a sample's noise, to which tolerances relate
+    solver = BoundedLevenbergMarquardt(tolerance=LOOSE * level, patience=PATIENCE)
+    searches = Searches(problem)
     sides = [(int(i), side) for i in np.flatnonzero(chosen & (errors > 0)) for side in (-1.0, 1.0)]
     for i, side in sides:
         distance, end = np.sqrt(CHI_SQUARE) * errors[i], found
-        most = max(far[i], distance)
-        while distance <= most and left > 0:
-            moved = moved_to(problem, end, i, found.values[i] + side * distance)
+        farthest = max(far[i], distance)
+        while distance <= farthest and left > 0:
+            moved = moved_to(searches, end, i, found.values[i] + side * distance, STEPS, solver)
             if moved is None:
                 break
-            end = search(moved, STEPS, held=i, solver=LOOSE)
+            end = moved
             left -= end.steps
             rise = (end.squares - found.squares) / variance
             if not rise < CHI_SQUARE:
                 break
             wide[i] = max(wide[i], distance / np.sqrt(max(rise, 1.0)))
             open_ended[i] |= distance == far[i]
-            distance = min(GROWTH * distance, most) if distance < most else np.inf
+            distance = min(GROWTH * distance, farthest) if distance < farthest else np.inf
     return Profile(wide, open_ended)
 
 
-def moved_to(problem: Problem, end: SearchEnd, index: int, value: float) -> Problem | None:
-    """The problem from the end of another search, with one value changed; `None` if the law refuses this value."""
-    lower, upper = problem.free.limits()
-    values = end.values.copy()
+def moved_to(
+    searches: Searches, end: SearchEnd, index: int, value: float, steps: int, solver: BoundedLevenbergMarquardt
+) -> SearchEnd | None:
+    """The end of a search from that of another one, with one value changed; `None` if the law refuses this value."""
+    problem, values = searches.problem, end.values.copy()
     values[index] = value
-    moved = problem.started_at(values)
-    inside = lower[index] < value < upper[index] and keeps_conditions(moved.free.tree)
-    return moved if inside else None
+    lower, upper = problem.free.limits()
+    inside = lower[index] < value < upper[index]
+    if not inside or (problem.has_conditions and not keeps_conditions(problem.started_at(values).free.tree)):
+        return None
+    return searches.end(values, steps, held=index, solver=solver)
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -155,6 +163,7 @@ class _Side:
 
     def __init__(self, evidence: Evidence, index: int, unit: float) -> None:
         self.evidence, self.index, self.unit = evidence, index, unit
+        self.searches = Searches(evidence.problem)
         self.centre = float(evidence.minimum.values[index])
         jacobian = evidence.minimum.jacobian
         others = np.delete(jacobian, index, axis=1)
@@ -166,10 +175,9 @@ class _Side:
 
     def at(self, value: float, start: SearchEnd) -> tuple[float, SearchEnd] | None:
         """Cost at a value, and the end of the search; `None` where the law refuses the value."""
-        moved = moved_to(self.evidence.problem, start, self.index, value)
-        if moved is None:
+        end = moved_to(self.searches, start, self.index, value, CURVE_STEPS, COARSE)
+        if end is None:
             return None
-        end = search(moved, CURVE_STEPS, held=self.index, solver=COARSE)
         return max(end.squares - self.evidence.minimum.squares, 0.0) / self.one, end
 
     def walk(self, way: float, level: float) -> tuple[list[tuple[float, float]], float]:

@@ -227,5 +227,5 @@ def _printed_slopes(
     if printed is None:
         return None
     slopes = np.zeros((velocity.size, values.size))
-    slopes[:, columns] = printed(values[columns])[1].reshape(*shape, -1)[:, -1]
+    slopes[:, columns] = printed(values[columns])[:, :-1].reshape(*shape, -1)[:, -1]
     return slopes

@@ -60,78 +60,99 @@ class _Point(NamedTuple):
     jacobian: Float[np.ndarray, "1 samples free"]  # with respect to the physical values
 
 
-def search(
-    problem: Problem,
-    max_steps: int,
-    held: int | None = None,
-    solver: Solver | None = None,
-) -> SearchEnd:
-    """Minimise the sum of squares.
+class Searches:
+    """Searches of one problem by `BoundedLevenbergMarquardt`, which share all that is made for the first."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self.coordinates = problem, problem.coordinates
+        self._kind = problem.free.values.dtype
+        self._printed = evaluator(problem.free, problem.residuals) if self._kind == np.float64 else None
+        self._to_values = self.coordinates.on_host() if self._printed else None
+
+    def end(
+        self,
+        values: Float[np.ndarray, " free"],
+        max_steps: int,
+        *,
+        held: int | None = None,
+        solver: BoundedLevenbergMarquardt | None = None,
+    ) -> SearchEnd:
+        """Minimise the sum of squares.
+
+        Arguments:
+            values: physical values to start from.
+            max_steps: largest number of points tried, including the start.
+            held: index of a parameter that is held at its start.
+            solver: with tolerances of its own.
+        """
+        lower, upper = (np.array(side, np.float64) for side in self.coordinates.bounds())
+        start = np.asarray(self.coordinates.from_physical(values), np.float64)
+        if held is not None:
+            lower[held] = upper[held] = start[held]
+        limits = {"lower": lower, "upper": upper, "precision": float(jnp.finfo(self._kind).eps)}
+        bounded = dataclasses.replace(solver or BoundedLevenbergMarquardt(), **limits)
+        end = least_squares_on_host(self._at, bounded, start[None], max_steps)
+        point: _Point = end.aux
+        return SearchEnd(point.values[0], point.residual[0], point.jacobian[0], end.status[0], int(end.steps[0]))
+
+    def _at(self, y: Float[np.ndarray, "1 free"], lanes: object) -> tuple[Linearisation, _Point]:
+        del lanes  # there is one
+        if self._printed is None or self._to_values is None:
+            return _by_xla(self.problem, self.coordinates, jnp.asarray(y[0], self._kind))
+        values, units = self._to_values(y[0])
+        of_law, slopes = self._printed.margins(values)
+        whole = self._printed(values)
+        return _linearised(self.problem, values, whole, self._printed.triangle(whole), units, of_law, slopes @ units)
+
+
+def search(problem: Problem, max_steps: int, solver: Solver | None = None) -> SearchEnd:
+    """Minimise the sum of squares from the start of a problem.
 
     Arguments:
         problem: the problem with its start.
         max_steps: largest number of points tried, including the start.
-        held: index of a parameter that is held at its start.
         solver: a `BoundedLevenbergMarquardt` with tolerances of its own, or any other solver of optimistix, which then
             searches in coordinates without bounds.
     """
-    solver = BoundedLevenbergMarquardt() if solver is None else solver
-    if not isinstance(solver, BoundedLevenbergMarquardt):
+    if solver is not None and not isinstance(solver, BoundedLevenbergMarquardt):
         return _search_unbounded(problem, max_steps, solver)
-    coordinates = problem.coordinates
-    lower, upper = (np.array(side, np.float64) for side in coordinates.bounds())
-    start = np.asarray(coordinates.start, np.float64)
-    if held is not None:
-        lower[held] = upper[held] = start[held]
-    kind = problem.free.values.dtype
-    bounded = dataclasses.replace(solver, lower=lower, upper=upper, precision=float(jnp.finfo(kind).eps))
-
-    printed = evaluator(problem.free, problem.residuals) if kind == np.float64 else None
-    to_values = coordinates.on_host() if printed else None
-
-    def at(y: Float[np.ndarray, "1 free"], _: Any) -> tuple[Linearisation, _Point]:
-        if printed is None or to_values is None:
-            return _linearised(problem, *_by_xla(problem, coordinates, jnp.asarray(y[0], kind)))
-        values, units = to_values(y[0])
-        of_law, slopes = printed.margins(values)
-        return _linearised(problem, values, *printed(values), units, of_law, slopes @ units)
-
-    end = least_squares_on_host(at, bounded, start[None], max_steps)
-    point: _Point = end.aux
-    return SearchEnd(point.values[0], point.residual[0], point.jacobian[0], end.status[0], int(end.steps[0]))
+    return Searches(problem).end(np.asarray(problem.free.values), max_steps, solver=solver)
 
 
-def _by_xla(problem: Problem, coordinates: Coordinates, y: Array) -> list[np.ndarray]:
-    """What `_linearised` takes, by the one compiled program."""
-    return [np.asarray(a, np.float64) for a in _evaluated(coordinates, y, problem.residuals)]
+def _by_xla(problem: Problem, coordinates: Coordinates, y: Array) -> tuple[Linearisation, _Point]:
+    """The problem at a point, by the one compiled program."""
+    evaluated = _evaluated(coordinates, y, problem.residuals)
+    values, whole, *of_coordinates = (np.asarray(a, np.float64) for a in evaluated)
+    return _linearised(problem, values, whole, whole, *of_coordinates)
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def _linearised(
     problem: Problem,
     values: np.ndarray,
-    residual: np.ndarray,
-    jacobian: np.ndarray,
+    whole: np.ndarray,
+    reduced: np.ndarray,
     units: np.ndarray,
     of_law: np.ndarray,
     slopes: np.ndarray,
 ) -> tuple[Linearisation, _Point]:
-    """The problem at a point, from what `_evaluated` gives."""
-    residual, jacobian = problem.anchored(values, residual, jacobian)
-    rows = triangle(np.concatenate([jacobian, residual[:, None]], axis=1))
+    """The problem at a point, from what `_evaluated` gives and rows with the same products of columns."""
+    anchor = problem.anchor_rows(values)
+    whole = np.concatenate([whole, anchor]) if anchor.size else whole
+    rows = triangle(np.concatenate([reduced, anchor]) if anchor.size else reduced)
     rows = np.concatenate([rows[:, :-1] @ units, rows[:, -1:]], axis=1) / problem.level
-    here = _Point(values[None], residual[None], jacobian[None])
-    return Linearisation(rows[None], of_law[None], slopes[None], np.array([float(residual.size)])), here
+    here = _Point(values[None], whole[None, :, -1], whole[None, :, :-1])
+    return Linearisation(rows[None], of_law[None], slopes[None], np.array([float(len(whole))])), here
 
 
 @eqx.filter_jit
 def _evaluated(coordinates: Coordinates, y: Array, residuals: Sequence[AbstractResiduals]) -> tuple[Array, ...]:
-    """Physical values, residual and its Jacobian by them, theirs by y, the margins of the conditions and theirs."""
+    """Physical values, the Jacobian of the residual with it as last column, theirs by y, the margins and theirs."""
     values = coordinates.to_physical(y)
     residual, jacobian = linearised(coordinates.free, values, residuals)
     units = jax.jacfwd(coordinates.to_physical)(y)
     of_law, slopes = condition_margins(coordinates, y)
-    return values, residual, jacobian, units, of_law, slopes
+    return values, jnp.concatenate([jacobian, residual[:, None]], axis=1), units, of_law, slopes
 
 
 def condition_margins(
@@ -158,7 +179,7 @@ def _search_unbounded(problem: Problem, max_steps: int, solver: Solver) -> Searc
     solution = optx.least_squares(residual, solver, start, max_steps=max_steps, throw=False)
     bounded = problem.coordinates
     y = bounded.from_physical(coordinates.to_physical(solution.value))
-    _, point = _linearised(problem, *_by_xla(problem, bounded, y))
+    _, point = _by_xla(problem, bounded, y)
     if solution.result == optx.RESULTS.successful:
         status = Status.CONVERGED
     elif solution.result == optx.RESULTS.nonlinear_max_steps_reached:

@@ -2,15 +2,14 @@
 
 import dataclasses
 import functools
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Protocol, runtime_checkable
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optax
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
@@ -29,6 +28,21 @@ from jaxdamp.identify.problem import AbstractResiduals
 from jaxdamp.identify.starting import Start
 from jaxdamp.identify.traces import batches
 from jaxdamp.parameters import Coordinates
+
+
+@runtime_checkable
+class Optimiser(Protocol):
+    """The rules of an optimiser of optax, which is loaded only for training."""
+
+    @property
+    def init(self) -> Callable[[PyTree], PyTree]:
+        """The state before the first step, from the numbers."""
+        ...
+
+    @property
+    def update(self) -> Callable[[PyTree, PyTree, PyTree], tuple[PyTree, PyTree]]:
+        """The change of the numbers and the next state, from the gradient, the state and the numbers."""
+        ...
 
 
 CHUNK = 25  # steps in one compiled call, after which the held-out records are evaluated
@@ -106,7 +120,7 @@ def train(
     steps: int = 2000,
     patience: int = 400,
     learning_rate: float = 0.02,
-    optimiser: optax.GradientTransformation | None = None,
+    optimiser: Optimiser | None = None,
     samples_per_cycle: int = 200,
 ) -> Training:
     """Train a law with many weights, such as `Hybrid`, by gradient descent with early stopping.
@@ -215,8 +229,10 @@ def _check(runs: Sequence[BenchRun], held_out: Sequence[BenchRun], steps: int, p
 
 
 @functools.lru_cache
-def _adam(learning_rate: float, steps: int) -> optax.GradientTransformation:
+def _adam(learning_rate: float, steps: int) -> Optimiser:
     """Adam with clipped gradients; one object for each choice, so that the compiled step is reused."""
+    import optax
+
     schedule = optax.cosine_decay_schedule(learning_rate, steps, alpha=0.01)
     return optax.chain(optax.clip_by_global_norm(1.0), optax.adam(schedule))
 
@@ -242,19 +258,19 @@ def _error(coordinates: Coordinates, raw: Array, residuals: Sequence[AbstractRes
 def _descend(
     coordinates: Coordinates,
     raw: Array,
-    state: Any,
+    state: PyTree,
     residuals: Sequence[AbstractResiduals],
-    rule: optax.GradientTransformation,
+    rule: Optimiser,
     level: float,
     count: Array,
-) -> tuple[Array, Any]:
+) -> tuple[Array, PyTree]:
     """So many steps of the optimiser on the mean square relative to the level of the force."""
 
-    def step(_: Any, now: tuple[Array, Any]) -> tuple[Array, Any]:
+    def step(_: Array, now: tuple[Array, PyTree]) -> tuple[Array, PyTree]:
         raw, state = now
         slope = jax.grad(lambda raw: _mean_square(coordinates, raw, residuals) / level**2)(raw)
         with jax.numpy_dtype_promotion("standard"):  # optax mixes its integer count with floats
             change, state = rule.update(slope, state, raw)
-        return optax.apply_updates(raw, change), state  # type: ignore[return-value]
+        return raw + change, state
 
     return jax.lax.fori_loop(0, count, step, (raw, state))

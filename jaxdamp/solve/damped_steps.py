@@ -69,6 +69,7 @@ class State(NamedTuple):
     steps: Int[AnyArray, "*lanes"]  # points tried
     converged: LaneMask  # whether the search has ended by its tolerance
     stuck: LaneMask  # whether there is no further step
+    idle: Int[AnyArray, "*lanes"]  # points tried in a row without a decrease that counts
     aux: PyTree  # what the residual gives beside its value at the accepted point
 
 
@@ -90,6 +91,7 @@ class Rules(NamedTuple):
     precision: float
     rtol: float
     atol: float
+    patience: int | None
 
 
 def _library(array: AnyArray) -> ModuleType:
@@ -102,7 +104,7 @@ def at_edges(flat: Flat, rules: Rules) -> Flat:
     return xp.where(xp.abs(flat - rules.lower) < AT_EDGE, rules.lower, flat)
 
 
-def judged(xp: ModuleType, state: State, here: Linearisation, aux: PyTree) -> tuple[LaneMask, State]:
+def judged(xp: ModuleType, rules: Rules, state: State, here: Linearisation, aux: PyTree) -> tuple[LaneMask, State]:
     """Whether the point tried is accepted, and the state with its linearised problem if it is."""
     first, tried = state.steps == 0, _triangle(xp, here.rows)
     old, new = _half_squares(state.triangle), _half_squares(tried)
@@ -127,7 +129,12 @@ def judged(xp: ModuleType, state: State, here: Linearisation, aux: PyTree) -> tu
     chosen = {name: where(xp, accepted, value, getattr(state, name)) for name, value in changed.items()}
     step_size = xp.where(first, state.step_size, state.step_size / divisor)
     converged = ~first & (negligible | state.short)
-    return accepted, state._replace(step_size=step_size, steps=state.steps + 1, converged=converged, **chosen)
+    gained = first | (accepted & (old - new >= state.floor))
+    idle = xp.where(gained, 0, state.idle + 1)
+    if rules.patience is not None:
+        converged = converged | (idle >= rules.patience) | (state.whole & ~gained)
+    counts = {"steps": state.steps + 1, "idle": idle}
+    return accepted, state._replace(step_size=step_size, converged=converged, **counts, **chosen)
 
 
 def with_proposal(

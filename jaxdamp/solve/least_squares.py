@@ -66,6 +66,8 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         precision: relative rounding error of the residual; that of the type of the unknowns if left out.
         rtol: largest step that counts as short, relative to each unknown.
         atol: the same added to it.
+        patience: points tried in a row without a decrease worth a step of `tolerance`, after which a search ends too,
+            as it does if the whole step gains nothing; None for no such end.
         norm: the largest of all unknowns decides whether a step is short.
 
     >>> time = jnp.linspace(0.0, 2.0, 50)
@@ -84,6 +86,7 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
     precision: float | None = None
     rtol: float = 1e-6
     atol: float = 1e-9
+    patience: int | None = None
     norm: Callable[[PyTree], Array] = optx.max_norm
 
     def init(
@@ -120,6 +123,7 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
             steps=xp.zeros(lanes, int),
             converged=no,
             stuck=no,
+            idle=xp.zeros(lanes, int),
             aux=aux,
         )
 
@@ -133,9 +137,10 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         else:
             xp, (flat, unravel) = jnp, ravel_pytree(y)
             here, aux = _linearised(self, lambda flat: fn(unravel(flat), args), jnp.asarray(state.trial), unravel)
-        accepted, state = judged(xp, state, here, aux)
+        rules = rules_of(self, xp, y)
+        accepted, state = judged(xp, rules, state, here, aux)
         point: PyTree = where(xp, accepted, state.trial, flat)
-        state = with_proposal(xp, rules_of(self, xp, y), state, point, here.samples, accepted)
+        state = with_proposal(xp, rules, state, point, here.samples, accepted)
         return unravel(point), state, state.aux
 
     def terminate(
@@ -213,7 +218,7 @@ def rules_of(solver: BoundedLevenbergMarquardt, xp: ModuleType, like: PyTree) ->
         )
         lower, upper = (jnp.broadcast_to(side.astype(dtype), flat.shape) for side in sides)
     precision = solver.precision or float(jnp.finfo(dtype).eps)
-    return Rules(lower, upper, solver.tolerance, precision, solver.rtol, solver.atol)
+    return Rules(lower, upper, solver.tolerance, precision, solver.rtol, solver.atol, solver.patience)
 
 
 def _linearised(

@@ -4,6 +4,7 @@ import numpy as np
 import pint
 import pytest
 
+from jaxdamp import bench
 from jaxdamp.bench import units
 from jaxdamp.bench.columns import Choice, find_columns as find
 from jaxdamp.bench.headers import role_of
@@ -147,5 +148,39 @@ def test_the_factors_of_usual_units_are_those_of_pint():
     registry = pint.UnitRegistry()
     for role, factors in units._KNOWN.items():
         for unit, factor in factors.items():
-            assert factor == pytest.approx(registry.Quantity(1.0, unit).to(units.SI[role]).magnitude, rel=1e-15)
-            assert [conversion(other, unit) for other in units.SI if other != role] == [None] * (len(units.SI) - 1)
+            assert factor == pytest.approx(
+                registry.Quantity(1.0, unit).to(units.SI.get(role, "V")).magnitude, rel=1e-15
+            )
+            others = set(units.SI) - {role, "command" if role == "signal" else role}
+            assert not any(conversion(other, unit) for other in others)
+
+
+def written(tmp_path, head):
+    """A record of ten seconds below the lines of a header."""
+    rows = [f"{i / 100},{np.sin(i / 10):.6f},{np.cos(i / 10):.6f}" for i in range(1000)]
+    path = tmp_path / "record.csv"
+    path.write_text("\n".join([*head, *rows]))
+    return path
+
+
+@pytest.mark.parametrize(
+    "head",
+    [["t_s,x_mm,F_N"], ["time [s],stroke [mm],force [kN]"], ["Time,Displacement,Load", "s,in,N"], ["Zeit,Weg,Kraft_V"]],
+)
+def test_usual_headers_are_read_without_pint(head, tmp_path, monkeypatch):
+    def refused():
+        raise AssertionError("pint takes half a second to load")
+
+    for cached in (units.conversion, units.is_unit, units.ratio):
+        cached.cache_clear()
+    monkeypatch.setattr(units, "_registry", refused)
+    more = {"units": {"time": "s", "stroke": "mm"}, "gains": {"force": "500 N/V"}} if "Zeit,Weg,Kraft_V" in head else {}
+    run = bench.read(written(tmp_path, head), sign="rebound-positive", **more)[0]
+    assert len(run) == 1000
+
+
+def test_a_row_of_unusual_units_is_one(tmp_path):
+    head = ["Time,Velocity,Load", "s,km/h,kip"]
+    run = bench.read(written(tmp_path, head), sign="rebound-positive", stroke_from_velocity=True)[0]
+    assert np.max(np.abs(run.velocity)) == pytest.approx(1 / 3.6, rel=1e-3)
+    assert np.max(np.abs(run.force)) == pytest.approx(4448.22, rel=1e-3)

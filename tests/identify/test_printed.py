@@ -51,13 +51,15 @@ def test_residual_jacobian_and_prediction_are_those_of_xla(name, runs) -> None:
     assert to_values is not None
     values, units = to_values(y)
     expected = list(map(np.asarray, search._evaluated(coordinates, jnp.asarray(y), problem.residuals)))
-    residual, jacobian = by_c(values)
+    whole = by_c(values)
     conditions, slopes = by_c.margins(values)
-    answers = [values, residual, jacobian, units, conditions, slopes @ units]
+    answers = [values, whole, units, conditions, slopes @ units]
     for answer, right in zip(answers, expected, strict=True):
         assert answer.shape == right.shape
         scale = np.max(np.abs(right), axis=0, initial=1e-300)
         assert np.all(np.abs(answer - right) <= 1e-9 * scale)
+    reduced = by_c.triangle(whole)
+    assert np.allclose(reduced.T @ reduced, whole.T @ whole, rtol=1e-9, atol=1e-9 * np.max(np.abs(whole)) ** 2)
     model = problem.free.build(jnp.asarray(values))
     for batch in problem.residuals:
         assert isinstance(batch, Batch)

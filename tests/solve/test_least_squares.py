@@ -122,3 +122,25 @@ def test_a_start_without_finite_residual_has_no_step():
     solver = BoundedLevenbergMarquardt(lower=0.0)
     lost = optx.least_squares(misses, solver, jnp.ones(2), DATA * jnp.nan, throw=False)
     assert lost.result == optx.RESULTS.nonfinite
+
+
+@pytest.mark.parametrize("patience", [None, 3])
+def test_patience_ends_a_search_that_gains_nothing(patience):
+    """A residual that promises a decrease, as one does near a kink, which no step keeps."""
+
+    @jax.custom_jvp
+    def promising(y):
+        return jnp.sum(y) * jnp.zeros(2) + 1.0
+
+    promising.defjvp(lambda y, change: (promising(*y), 0.1 * change[0]))
+
+    def at(y, lanes):
+        rows = np.concatenate([0.1 * np.eye(2), np.ones((2, 1))], axis=1)
+        return Linearisation(rows[None], np.zeros((1, 0)), np.zeros((1, 0, 2)), np.array([2.0])), y
+
+    solver = BoundedLevenbergMarquardt(tolerance=1e-3, patience=patience)
+    end = optx.least_squares(lambda y, _: promising(y), solver, jnp.zeros(2), max_steps=500)
+    host = least_squares_on_host(at, solver, np.zeros((1, 2)), 500)
+    assert host.steps[0] == int(end.stats["num_steps"]) and host.status == [Status.CONVERGED]
+    np.testing.assert_allclose(host.y[0], end.value, atol=1e-12)
+    assert host.steps[0] == 4 if patience else host.steps[0] > 6

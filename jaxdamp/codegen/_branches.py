@@ -1,0 +1,110 @@
+"""Costly operations only where their results are used: those that one side of `jnp.where` takes go into a branch.
+
+The rounded knees of a curve, for instance, take four exponentials each, which `jnp.where` drops if their width is zero.
+"""
+
+from collections.abc import Iterable, Sequence
+from itertools import chain, groupby
+from typing import NamedTuple
+
+from jaxdamp.codegen._program import (
+    Assign,
+    Branch,
+    Declare,
+    Define,
+    Loop,
+    Statement,
+    Variable,
+    constant,
+    names,
+    names_in,
+)
+
+
+CHEAP = frozenset(
+    "add sub mul neg abs max min lt le gt ge eq ne and or xor not select copy convert sign look_up is_finite".split()
+)
+
+
+class Case(NamedTuple):
+    """The value of a condition for which something is used."""
+
+    condition: Variable
+    value: bool
+
+
+def in_branches(
+    statements: Sequence[Statement], after: Sequence[Statement], results: set[str], changing: Iterable[str] = ()
+) -> list[Statement]:
+    """The same statements, with the costly ones that only one side of selections takes in branches.
+
+    Arguments:
+        statements: of a block.
+        after: what follows them, which stays as it is.
+        results: names that are used after both in any case.
+        changing: names of variables that are assigned outside the block, which are no conditions.
+    """
+    changing = {*changing, *(s.target.name for s in statements if isinstance(s, Declare))}
+    cases = _cases([*statements, *after], results, changing)
+    defined = [s for s in statements if isinstance(s, Define)]
+    costly = {cases[s.target.name] for s in defined if s.operation not in CHEAP} - {None}
+
+    def case(statement: Statement) -> Case | None:
+        of = cases[statement.target.name] if isinstance(statement, Define) else None
+        return of if of in costly else None
+
+    runs = [(of, list(run)) for of, run in groupby(statements, case)]
+    used = [names_in(run) for _, run in runs]
+    declared: list[Declare] = []
+    written: list[Statement] = []
+    for number, (of, run) in enumerate(runs):
+        if of is None:
+            written += [_loop(s, changing) if isinstance(s, Loop) else s for s in run]
+            continue
+        outside = results.union(names_in(after), *used[:number], *used[number + 1 :])
+        shared = {s.target for s in run if isinstance(s, Define) and s.target.name in outside}
+        declared += [Declare(target, constant(0, target.dtype)) for target in shared]
+        body = list(chain.from_iterable(_assigned(s, shared) for s in run))
+        written.append(Branch(of.condition, [[], body] if of.value else [body, []]))
+    declared.sort(key=lambda s: s.target.name)
+    return [*declared, *written]
+
+
+def _loop(loop: Loop, changing: set[str]) -> Loop:
+    """The same loop, whose assigned variables and ends are used in any case."""
+    return Loop(in_branches(loop.body, (), set(), changing))
+
+
+def _assigned(statement: Statement, shared: set[Variable]) -> list[Statement]:
+    """A statement of a branch; a result that is used outside is assigned to a variable declared before it."""
+    if not isinstance(statement, Define) or statement.target not in shared:
+        return [statement]
+    inside = Variable(f"{statement.target.name}_", statement.target.dtype)
+    return [Define(inside, statement.operation, statement.operands), Assign(statement.target, inside)]
+
+
+def _cases(statements: Sequence[Statement], results: set[str], changing: set[str]) -> dict[str, Case | None]:
+    """The one case in which each name is used, as a side of selections by one condition; None if it is used in any."""
+    places = {s.target.name: i for i, s in enumerate(statements) if isinstance(s, Define)}
+    cases: dict[str, Case | None] = dict.fromkeys(results)  # none: always
+
+    def use(taken: Iterable[str], case: Case | None) -> None:
+        for name in taken:
+            cases[name] = case if cases.get(name, case) == case else None
+
+    for place in range(len(statements) - 1, -1, -1):
+        s = statements[place]
+        if not isinstance(s, Define):
+            use(names_in([s]), None)
+            continue
+        case = cases.setdefault(s.target.name, None)
+        if case and places.get(case.condition.name, -1) >= place:  # not known yet
+            case = cases[s.target.name] = None
+        condition, *sides = s.operands
+        if s.operation == "select" and case is None and isinstance(condition, Variable):
+            use([condition.name], None)
+            for value, side in zip((True, False), sides, strict=True):
+                use(names([side]), None if condition.name in changing else Case(condition, value))
+        else:
+            use(names(s.operands), case)
+    return cases
