@@ -18,9 +18,9 @@ _DOUBLINGS = 51  # of the first interval, until nothing is left of the start
 def lyapunov(a: Float[Array, "n n"], q: Float[Array, "n n"]) -> Float[Array, "n n"]:
     """The solution P = ∫ e^{At} Q e^{Aᵀt} dt of A P + P Aᵀ + Q = 0 for a stable A, by doubling of the interval.
 
-    Over a short interval h both P = ∫ e^{As} Q e^{Aᵀs} ds and F = e^{Ah} are Taylor series; then P(2h) = P(h) + F P(h) Fᵀ
-    and F(2h) = F(h)². F is stored as E = F − 1, which is small at first: F itself would lose the slow motions to
-    rounding. Differentiable; n³ operations a step.
+    Over a short interval h both P(h) = ∫ e^{As} Q e^{Aᵀs} ds and F(h) = e^{Ah} are Taylor series; then
+    P(2h) = P(h) + F P(h) Fᵀ and F(2h) = F(h)². F is stored as E = F − 1, which is small at first: F itself would lose
+    the slow motions to rounding. Differentiable; n³ operations a step.
     """
     size = jnp.abs(jax.lax.stop_gradient(a))
     first = 0.25 / at_least(jnp.maximum(jnp.max(jnp.sum(size, axis=0)), jnp.max(jnp.sum(size, axis=1))), 1e-30)
