@@ -252,7 +252,7 @@ def _nearest_of_one(
     placing = np.eye(count, dtype=mean.dtype)[:, places]
 
     def at(curved_values: Array) -> Array:
-        return placing @ curved_values
+        return jnp.asarray(placing) @ curved_values
 
     def answers(values: Array) -> Array:
         return _answers(law, list(values))
