@@ -3,7 +3,7 @@
     python -m benchmarks.first_result [DYNO FILES]
 
 The files, all of one damper and counted positive in rebound, are also fitted at the command line: the first one by the
-laws that suit it, all of them by every law. Without files there is one, of a virtual damper, written before the clock
+laws that suit it, also with a delay of the machine, all of them by every law. Without files there is one, of a virtual damper, written before the clock
 starts. Wall and processor time stand in seconds and in bases, of which one is a new process that imports jax and
 compiles x * x; beside them the number of XLA programs.
 """
@@ -50,7 +50,7 @@ jax.monitoring.register_event_duration_secs_listener(
 )
 atexit.register(lambda: print("programs:", len(programs), file=sys.stderr))
 from jaxdamp.cli import app
-sys.argv[:] = ["jaxdamp", "fit", *{files!r}, *{law!r}, "--sign", "rebound-positive", "--out", {out!r}]
+sys.argv[:] = ["jaxdamp", "fit", *{files!r}, *{options!r}, "--sign", "rebound-positive", "--out", {out!r}]
 app()
 """
 
@@ -108,12 +108,13 @@ def report_fits(files: list[str]) -> None:
         rows: list[list[Any]] = [["base", *base, 1.0, 1.0, ""]]
         asked = {
             "one file, laws that suit it": (files[:1], []),
+            "one file, with a delay of the machine": (files[:1], ["--rig", "offset,delay"]),
             f"{len(files)} files, all laws": (files, ["--law", "all"]),
         }
-        for name, (some, law) in asked.items():
+        for name, (some, options) in asked.items():
             for again in ("", ", again"):
                 out = str(Path(folder) / f"{len(rows)}")
-                script = COUNTED.format(files=some, law=law, out=out)
+                script = COUNTED.format(files=some, options=options, out=out)
                 wall, used, programs = cost(script, str(Path(folder) / f"cache {name}"))
                 rows.append([f"jaxdamp fit, {name}{again}", wall, used, wall / base[0], used / base[1], programs])
     head = ["what", "wall, s", "processor, s", "bases, wall", "bases, processor", "XLA programs"]

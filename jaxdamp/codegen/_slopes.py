@@ -47,6 +47,7 @@ def with_slopes(
     free: Sequence[int],
     states: int,
     rest: Sequence[Symbols] = (),
+    moves: Sequence[Symbols] = (),
 ) -> str:
     """The C text of `function(arrays, states, *rest)` and its derivatives in lanes.
 
@@ -59,6 +60,7 @@ def with_slopes(
         free: those arrays that the function is differentiated by; each of their numbers has a row of `dp`.
         states: how many states there are, `s[0]`, ..., whose derivatives are `ds[][k]`.
         rest: the other arguments.
+        moves: their derivatives in lane `k`; none if they have none.
 
     Raises:
         NotImplementedError: something that cannot be printed.
@@ -67,17 +69,24 @@ def with_slopes(
     arrays = _cut(symbols("p", (numbers,)), shapes)
     of_arrays = _cut(in_lanes("dp", slopes), [shapes[i] for i in free])
 
-    def both(arrays: list[Array], states: Array, of_arrays: list[Array], of_states: Array, *rest: Array) -> PyTree:
-        def of(some: list[Array], states: Array) -> PyTree:
+    def both(arrays: list[Array], own: list[Array], of_arrays: list[Array], of_own: list[Array]) -> PyTree:
+        def of(some: list[Array], *own: Array) -> PyTree:
             moved = dict(zip(free, some, strict=True))
-            return function([moved.get(i, array) for i, array in enumerate(arrays)], states, *rest)
+            return function([moved.get(i, array) for i, array in enumerate(arrays)], *own, *own_still)
 
-        return jax.jvp(of, ([arrays[i] for i in free], states), (of_arrays, of_states))
+        changing, own_still = own[: len(of_own)], own[len(of_own) :]
+        return jax.jvp(of, ([arrays[i] for i in free], *changing), (of_arrays, *of_own))
 
-    program = lower(both, arrays, symbols("s", (states,)), of_arrays, in_lanes("ds", states), *rest)
+    own, of_own = [symbols("s", (states,)), *rest], [in_lanes("ds", states), *moves]
+    program = lower(both, arrays, own, of_arrays, of_own)
     parameters = {f"p[{i}]" for i in range(numbers)}
     tangents = {f"dp[{i}][k]" for i in range(slopes)}
-    return _text(signature, program, parameters, tangents, tangents | {f"ds[{i}][k]" for i in range(states)})
+    return _text(signature, program, parameters, tangents, tangents | _names_of(of_own))
+
+
+def _names_of(some: Sequence[Symbols]) -> set[str]:
+    """The names of inputs, without those that are known numbers."""
+    return {name for each in some for name in each.names.ravel() if isinstance(name, str)}
 
 
 def _cut(flat: Symbols, shapes: Sequence[tuple[int, ...]]) -> list[Symbols]:

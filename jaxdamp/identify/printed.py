@@ -1,9 +1,9 @@
 """Forces of a law in bench records, and their derivatives, by printed C: compiled in a tenth of XLA's time.
 
 One function for each structure of a law serves records of any number and length, every start, and predictions. What it
-cannot compute is computed by XLA, with the same numbers: a machine with delay, lag, mass or heat, a measured
-temperature, a command that varies, periodic or estimated initial states, single precision, or where no C compiler is
-at hand; the log says so once for each reason.
+cannot compute is computed by XLA, with the same numbers: a machine with heat, a measured temperature, a command that
+varies, periodic or estimated initial states, single precision, or where no C compiler is at hand; the log says so once
+for each reason.
 """
 
 import dataclasses
@@ -18,7 +18,8 @@ from jaxdamp._traced import is_traced
 from jaxdamp._triangles import triangle
 from jaxdamp.dampers import laws_inside
 from jaxdamp.identify.model import Model, starts_in
-from jaxdamp.identify.printed_law import PrintedLaw, Record, numbers_on_rig, plain_rig, printed_law, say
+from jaxdamp.identify.printed_law import PrintedLaw, numbers_on_rig, plain_rig, printed_law, say
+from jaxdamp.identify.printed_records import PRINTED, MachineNumbers, Row, rows_of
 from jaxdamp.identify.problem import AbstractResiduals
 from jaxdamp.identify.traces import Batch
 from jaxdamp.parameters import FreeParameters, get, with_values
@@ -35,8 +36,8 @@ def _refusal(parts: Sequence[object], model: PyTree) -> str:
     for part in parts:
         if not isinstance(part, Batch):
             return f"{type(part).__name__} beside the records"
-        if part.effects:
-            return f"a machine with {', '.join(part.effects)}"
+        if others := [effect for effect in part.effects if effect not in PRINTED]:
+            return f"a machine with {', '.join(others)}"
         if part.temperature is not None:
             return "a measured temperature"
         if part.command is not None:
@@ -50,40 +51,6 @@ def _refusal(parts: Sequence[object], model: PyTree) -> str:
     return "a law that is traced" if is_traced((parts, model)) else ""
 
 
-def _records(batch: Batch) -> list[Record]:
-    rows, parts = [], batch.substeps
-    columns = (batch.dt, batch.stroke, batch.velocity, batch.weight, batch.force)
-    for step, stroke, velocity, weight, force in zip(*map(np.asarray, columns), strict=True):
-        fine = (stroke, velocity)
-        if parts > 1:
-            fine = _refined(stroke, step * velocity, parts), _refined(velocity, step * _slopes(velocity, step), parts)
-        used = np.flatnonzero(weight > 0)
-        count = int(used[-1]) + 1 if used.size else 0
-        x, v, fine_x, fine_v, w, f = map(np.ascontiguousarray, (stroke, velocity, *fine, weight, force))
-        rows.append(Record(x, v, fine_x, fine_v, parts, float(step) / parts, w, f, count))
-    return rows
-
-
-def _slopes(values: np.ndarray, step: float) -> np.ndarray:
-    """`rig.marching.slopes` by NumPy."""
-    if values.size < 5:
-        return np.gradient(values, step)
-    slopes = np.empty_like(values)
-    slopes[2:-2] = (values[:-4] - 8.0 * values[1:-3] + 8.0 * values[3:-1] - values[4:]) / 12.0
-    edge = np.array([[-25.0, 48.0, -36.0, 16.0, -3.0], [-3.0, -10.0, 18.0, -6.0, 1.0]]) / 12.0
-    slopes[:2], slopes[-2:] = edge @ values[:5], -(edge @ values[:-6:-1])[::-1]
-    return slopes / step
-
-
-def _refined(values: np.ndarray, rises: np.ndarray, parts: int) -> np.ndarray:
-    """Cubic Hermite interpolation to so many parts of each interval."""
-    s = (np.arange(parts) / parts)[None, :]
-    start, start_rise, stop, stop_rise = values[:-1, None], rises[:-1, None], values[1:, None], rises[1:, None]
-    between = start_rise * (s * (1 - s) ** 2) + stop_rise * (s * s * (s - 1))
-    fine = start * ((1 + 2 * s) * (1 - s) ** 2) + stop * (s * s * (3 - 2 * s)) + between
-    return np.append(np.ravel(fine), values[-1])
-
-
 def predicted(batch: Batch, model: Model) -> Float[np.ndarray, "runs time"] | None:
     """Forces [N] of a model in records; None where XLA computes them."""
     if _refusal([batch], model):
@@ -92,7 +59,11 @@ def predicted(batch: Batch, model: Model) -> Float[np.ndarray, "runs time"] | No
     law = printed_law(numbers[0], None)
     if law is None:
         return None
-    return np.stack([law.forces(own.flat, row) for own, row in zip(numbers, _records(batch), strict=True)])
+    forces, none = [], MachineNumbers(-1, -1, -1)
+    for p, row in zip((own.flat for own in numbers), rows_of(batch), strict=True):
+        record = row.on_machine(law.machine(p).delay)
+        forces.append(row.shown(law.forces(p, record)[:, None], record, law.machine(p), none)[:, 0])
+    return np.stack(forces)
 
 
 def _numbers_of(batch: Batch, model: Model, rig: Rig | None = None) -> list[LawNumbers]:
@@ -123,20 +94,29 @@ class Evaluator:
     """
 
     law: PrintedLaw
-    rows: list[tuple[int, Record, np.ndarray, np.ndarray]]
+    rows: list[tuple[int, Row, np.ndarray, np.ndarray]]
     size: int
     free: int
 
     def __call__(self, values: Float[np.ndarray, " free"]) -> Float[np.ndarray, "samples columns"]:
         """The Jacobian of the weighted residual, which is the last column."""
         out = np.zeros((self.size, self.free + 1))
-        for place, record, p, taken in self.rows:
-            self.law.linearise(self._at(p, taken, values), record, self._columns(taken), out[place:])
+        for place, row, p, taken in self.rows:
+            at, columns = self._at(p, taken, values), self._columns(taken)
+            if not row.effects:
+                self.law.linearise(at, row.still, columns, out[place:])
+                continue
+            numbers = self.law.machine(at)
+            record = row.on_machine(numbers.delay)
+            forces = np.zeros((record.used, self.free + 1))
+            self.law.linearise(at, record, columns, forces)
+            shown = row.shown(forces, record, numbers, self.law.machine(taken))
+            out[place : place + len(shown)] = row.missed(shown)
         return out
 
     def triangle(self, out: Float[np.ndarray, "samples columns"]) -> Float[np.ndarray, "rows columns"]:
         """Rows with the same products of columns: the triangles of the records, without samples after the last used."""
-        return np.concatenate([triangle(out[place : place + record.used]) for place, record, _, _ in self.rows])
+        return np.concatenate([triangle(out[place : place + row.used]) for place, row, _, _ in self.rows])
 
     def margins(
         self, values: Float[np.ndarray, " free"]
@@ -182,10 +162,10 @@ def evaluator(free: FreeParameters, residuals: Sequence[AbstractResiduals]) -> E
         # values that the records state take no free number
         mine = with_values(taken_tree, {path: np.asarray(-1.0) for path in batch.fixed})
         marked = _numbers_of(dataclasses.replace(batch, fixed={}), mine, _blank(plain_rig()))
-        for record, numbers, taken in zip(_records(batch), _numbers_of(batch, model), marked, strict=True):
+        for row, numbers, taken in zip(rows_of(batch), _numbers_of(batch, model), marked, strict=True):
             first = first or numbers
             places.append({i for i, array in enumerate(taken.arrays) if np.any(array >= 0)})
-            rows.append((offset, record, numbers.flat, taken.flat.astype(np.int64)))
+            rows.append((offset, row, numbers.flat, taken.flat.astype(np.int64)))
             offset += batch.stroke.shape[1]
     law = None if first is None else printed_law(first, set().union(*places))
     if law is None or first is None:

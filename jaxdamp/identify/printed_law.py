@@ -5,15 +5,15 @@ import functools
 import logging
 import threading
 from collections.abc import Hashable
-from typing import NamedTuple
 
 import jax
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from jaxdamp.codegen import Signature, library, symbols, with_slopes
+from jaxdamp.codegen import Constant, Signature, Symbols, library, symbols, with_slopes
 from jaxdamp.dampers import laws_inside, margins
 from jaxdamp.identify.model import Model, OnRig, law_of, rig_of
+from jaxdamp.identify.printed_records import MachineNumbers, Record
 from jaxdamp.rig import LawNumbers, Rig, gas_and_friction, numbers_of
 
 
@@ -25,11 +25,14 @@ _HEAD = """#include <math.h>
 #include <string.h>
 enum {{ SLOPES = {slopes}, LANES = {lanes}, STATES = {states} }};
 static const double dp[SLOPES + 1][LANES] = {{{rows}}};
+{moves}
 """
+# Derivatives of the motion by the delay of the machine, which are those of its lane.
+_MOVES = "\n".join(f"#define D{end} (d{end} * dp[{{0}}][k])" for end in ("x", "v", "x0", "v0", "x1", "v1"))
 _RECORD = """
 void record(const double *p, int64_t count, int64_t parts, const double *x, const double *v, const double *fine_x,
-            const double *fine_v, double h, const double *weight, const double *measured, const int64_t *column,
-            int64_t width, double *out)
+            const double *fine_v, const double *dx, const double *dv, const double *fine_dx, const double *fine_dv,
+            double h, const double *weight, const double *measured, const int64_t *column, int64_t width, double *out)
 {
     double s[STATES + 1], F, dF[LANES] __attribute__((aligned(64)));
     double ds[STATES + 1][LANES] __attribute__((aligned(64)));
@@ -38,17 +41,18 @@ void record(const double *p, int64_t count, int64_t parts, const double *x, cons
     begin(p, s, ds, slopes);
     for (int64_t t = 0; t < count; t++) {
         if (!slopes) {
-            force(p, x[t], v[t], s, (const double (*)[LANES])ds, &F, dF, 0);
+            force(p, x[t], v[t], 0.0, 0.0, s, (const double (*)[LANES])ds, &F, dF, 0);
             out[t] = F;
         } else if (weight[t] > 0.0) {
             double *row = out + t * width;
-            force(p, x[t], v[t], s, (const double (*)[LANES])ds, &F, dF, 1);
+            force(p, x[t], v[t], dx ? dx[t] : 0.0, dv ? dv[t] : 0.0, s, (const double (*)[LANES])ds, &F, dF, 1);
             for (int k = 0; k < SLOPES; k++) row[column[k]] += dF[k] * weight[t];
             row[width - 1] = (F - measured[t]) * weight[t];
         }
         if (STATES && t + 1 < count)
             for (int64_t j = t * parts; j < (t + 1) * parts; j++)
-                advance(p, fine_x[j], fine_v[j], fine_x[j + 1], fine_v[j + 1], h, s, ds, slopes);
+                advance(p, fine_x[j], fine_v[j], fine_x[j + 1], fine_v[j + 1], h, dx ? fine_dx[j] : 0.0,
+                        dx ? fine_dv[j] : 0.0, dx ? fine_dx[j + 1] : 0.0, dx ? fine_dv[j + 1] : 0.0, s, ds, slopes);
     }
 }
 """
@@ -57,10 +61,10 @@ void conditions(const double *p, double *m, double (*dm)[LANES]) { margins_prepa
 """
 _ARGUMENTS = {
     "begin": "double *restrict s, double (*restrict ds)[LANES], int slopes",
-    "force": "double x, double v, const double *restrict s, const double (*restrict ds)[LANES], double *restrict F, "
-    "double *restrict dF, int slopes",
-    "advance": "double x0, double v0, double x1, double v1, double h, double *restrict s, "
-    "double (*restrict ds)[LANES], int slopes",
+    "force": "double x, double v, double dx, double dv, const double *restrict s, "
+    "const double (*restrict ds)[LANES], double *restrict F, double *restrict dF, int slopes",
+    "advance": "double x0, double v0, double x1, double v1, double h, double dx0, double dv0, double dx1, double dv1, "
+    "double *restrict s, double (*restrict ds)[LANES], int slopes",
     "margins": "double *restrict m, double (*restrict dm)[LANES], int slopes",
 }
 
@@ -74,25 +78,6 @@ def plain_rig() -> Rig:
 def numbers_on_rig(model: Model, rig: Rig | None = None) -> LawNumbers:
     """The numbers of a law on its machine, or on another one if it has none."""
     return numbers_of(OnRig(law_of(model), rig_of(model) or rig or plain_rig()))
-
-
-class Record(NamedTuple):
-    """A record as its function takes it."""
-
-    stroke: np.ndarray
-    velocity: np.ndarray
-    fine_stroke: np.ndarray
-    fine_velocity: np.ndarray
-    parts: int
-    step: float  # s, of a part
-    weight: np.ndarray
-    force: np.ndarray
-    used: int  # samples up to the last one with a weight
-
-    def motion(self) -> tuple[int, int, int, int, int, float]:
-        """The arguments that describe the motion."""
-        places = (a.ctypes.data for a in (self.stroke, self.velocity, self.fine_stroke, self.fine_velocity))
-        return (self.parts, *places, self.step)  # type: ignore[return-value]
 
 
 class PrintedLaw:
@@ -109,6 +94,11 @@ class PrintedLaw:
             if any(law.has_conditions() for _, law in laws_inside(model))
             else 0
         )
+        ends = np.cumsum([0, *(array.size for array in numbers.arrays)])
+        rig = numbers.built([int(end) for end in ends[:-1]]).rig  # the place of each number
+        self._machine = MachineNumbers(*map(int, (rig.force_delay, rig.moving_mass, rig.force_lag)))
+        lanes = np.concatenate([ends[:0], *(np.arange(ends[i], ends[i + 1]) for i in free)])
+        delay = np.flatnonzero(lanes == self._machine.delay)
         m, printed = self.states, functools.partial(with_slopes, shapes=shapes, free=free)
 
         def force(arrays: list[Array], s: Array, x: Array, v: Array) -> Array:
@@ -129,6 +119,9 @@ class PrintedLaw:
             "advance": Signature("advance", _ARGUMENTS["advance"], states, of_states),
         }
         rest = {"force": list(map(symbols, "xv")), "advance": list(map(symbols, ("x0", "v0", "x1", "v1", "h")))}
+        moves = {name: [symbols(f"D{each.names[()]}") for each in some] for name, some in rest.items() if delay.size}
+        if delay.size:
+            moves["advance"][-1] = Symbols(np.array(Constant("0.0", "float64"), object))  # the step stays
         each = {"begin": (lambda arrays, s: numbers.built(arrays).law.initial_state(), 0)}
         each |= {"force": (force, m), "advance": (advance, m)}
         if self.conditions:
@@ -136,22 +129,23 @@ class PrintedLaw:
             signatures["margins"] = Signature("margins", _ARGUMENTS["margins"], *names)
             each["margins"] = (lambda arrays, s: margins(numbers.built(arrays)), 0)
         rows = np.eye(max(self.slopes, 1), self.lanes, dtype=int)
-        head = {"slopes": self.slopes, "lanes": self.lanes, "states": m}
+        head: dict[str, object] = {"slopes": self.slopes, "lanes": self.lanes, "states": m}
+        head["moves"] = _MOVES.format(*delay) if delay.size else ""
         parts = [_HEAD.format(**head, rows=", ".join(f"{{{', '.join(map(str, row))}}}" for row in rows))]
         parts += [
-            printed(signatures[name], function, states=count, rest=rest.get(name, ()))
+            printed(signatures[name], function, states=count, rest=rest.get(name, ()), moves=moves.get(name, ()))
             for name, (function, count) in each.items()
         ]
         text = "".join([*parts, _RECORD, _CONDITIONS * bool(self.conditions)])
         self._record, self._conditions = library(text).record, getattr(library(text), "conditions", None)
         pointer, whole = ctypes.c_void_p, ctypes.c_int64
-        self._record.argtypes = [pointer, whole, whole, *[pointer] * 4, ctypes.c_double, *[pointer] * 3, whole, pointer]
+        self._record.argtypes = [pointer, whole, whole, *[pointer] * 8, ctypes.c_double, *[pointer] * 3, whole, pointer]
         self._record.restype = None
 
     def forces(self, p: Float[np.ndarray, " numbers"], row: Record) -> Float[np.ndarray, " time"]:
         """The force [N] at every instant of a record."""
-        out = np.empty(len(row.stroke))
-        self._record(p.ctypes.data, len(out), *row.motion(), None, None, None, 0, out.ctypes.data)
+        out = np.empty(len(row.force))
+        self._record(p.ctypes.data, len(out), *_motion(row), None, None, None, 0, out.ctypes.data)
         return out
 
     def linearise(
@@ -159,7 +153,11 @@ class PrintedLaw:
     ) -> None:
         """Add weighted derivatives to the columns of `out`, and put the weighted difference into the last one."""
         data = row.weight.ctypes.data, row.force.ctypes.data, column.ctypes.data
-        self._record(p.ctypes.data, row.used, *row.motion(), *data, out.shape[1], out.ctypes.data)
+        self._record(p.ctypes.data, row.used, *_motion(row), *data, out.shape[1], out.ctypes.data)
+
+    def machine(self, flat: np.ndarray) -> MachineNumbers:
+        """The numbers of the machine among all, or what else stands in their places."""
+        return MachineNumbers(*(flat[place] for place in self._machine))
 
     def margins(
         self, p: Float[np.ndarray, " numbers"]
@@ -169,6 +167,11 @@ class PrintedLaw:
         if self._conditions is not None:
             self._conditions(*(ctypes.c_void_p(a.ctypes.data) for a in (p, values, slopes)))
         return values, slopes[:, : self.slopes]
+
+
+def _motion(row: Record) -> list[object]:
+    """The arguments of a record's function that describe its motion."""
+    return [row.parts, *row.motion.places(), *(row.by_delay.places() if row.by_delay else [None] * 4), row.step]
 
 
 _laws: dict[Hashable, list[PrintedLaw]] = {}

@@ -13,6 +13,7 @@ from jaxdamp.codegen import _native
 from jaxdamp.dampers import Besinger, Lag, Linear, LuGre, Spring
 from jaxdamp.identify import printed, printed_law, search
 from jaxdamp.identify.traces import Batch
+from jaxdamp.rig import Rig
 
 
 TRUTH = LuGre.guess(np.array([-0.3, 0.0, 0.3]), np.array([-600.0, 100.0, 900.0])) + Linear(1500.0) + Spring(2000.0)
@@ -39,10 +40,29 @@ def without_c(monkeypatch):
     return leave
 
 
+LATE = Rig(force_delay=1.3e-3)
+EARLY = Rig(force_delay=-2.7e-3, moving_mass=2.0, force_lag=3e-3, gas_force=-100.0, stroke_offset=1e-3)
+MACHINES = [
+    ("besinger", LATE),
+    ("besinger_lag", EARLY),
+    *(pytest.param(name, EARLY, marks=pytest.mark.slow) for name in ("besinger_series_spring", "lugre_spring")),
+    pytest.param("piecewise_linear", Rig(moving_mass=2.0, force_lag=1e-7), marks=pytest.mark.slow),
+]
+
+
+@pytest.mark.parametrize(("name", "rig"), MACHINES)
+def test_delay_mass_and_lag_of_a_machine_are_those_of_xla(name, rig, runs) -> None:
+    assert_as_xla(name, rig, runs)
+
+
 @pytest.mark.parametrize("name", LAWS)
 def test_residual_jacobian_and_prediction_are_those_of_xla(name, runs) -> None:
+    assert_as_xla(name, ["offset", "gas", "stroke_offset"], runs)
+
+
+def assert_as_xla(name, rig, runs) -> None:
     start = identify.default_ladder(runs, [name])[name]
-    problem = identify.prepare(start, runs, rig=["offset", "gas", "stroke_offset"])
+    problem = identify.prepare(start, runs, rig=rig)
     by_c = printed.evaluator(problem.free, problem.residuals)
     assert by_c is not None
     coordinates = problem.coordinates
@@ -57,7 +77,7 @@ def test_residual_jacobian_and_prediction_are_those_of_xla(name, runs) -> None:
     for answer, right in zip(answers, expected, strict=True):
         assert answer.shape == right.shape
         scale = np.max(np.abs(right), axis=0, initial=1e-300)
-        assert np.all(np.abs(answer - right) <= 1e-9 * scale)
+        assert np.all(np.abs(answer - right) <= 1e-9 * np.maximum(scale, 1e-9 * np.max(scale, initial=0.0)))
     reduced = by_c.triangle(whole)
     assert np.allclose(reduced.T @ reduced, whole.T @ whole, rtol=1e-9, atol=1e-9 * np.max(np.abs(whole)) ** 2)
     model = problem.free.build(jnp.asarray(values))
@@ -75,6 +95,7 @@ CASES = {
     ),
     "a value for each record": (Lag(Linear(1500.0), 0.003), {"per_record": ["rig.force_offset", "law.law.rate"]}),
     "robust": (Lag(Linear(1500.0), 0.003), {"loss": "huber"}),
+    "a delay for each record": (Linear(1500.0), {"rig": ["offset", "delay"], "per_record": ["rig.force_delay"]}),
 }
 
 
@@ -85,10 +106,11 @@ def test_a_fit_has_the_standard_errors_of_xla(case, without_c, monkeypatch) -> N
     start, how = CASES[case]
     by_c = []
     monkeypatch.setattr(search, "evaluator", lambda *a: by_c.append(printed.evaluator(*a)) or by_c[-1])
-    fitted = identify.fit(start, runs, rig="offset", starts=1, **how)
+    how = {"rig": "offset", **how}
+    fitted = identify.fit(start, runs, starts=1, **how)
     assert by_c and all(by_c)
     without_c()
-    expected = identify.fit(start, runs, rig="offset", starts=1, **how)
+    expected = identify.fit(start, runs, starts=1, **how)
     assert fitted.rmse == pytest.approx(expected.rmse, rel=1e-9)
     for one, other in zip(fitted.parameters, expected.parameters, strict=True):
         assert one.value == pytest.approx(other.value, abs=1e-4 * other.standard_error)

@@ -1,0 +1,200 @@
+"""Records as printed C takes them: behind the delay of a machine, between samples by cubics, with its moving mass."""
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+from typing import Generic, NamedTuple, TypeVar
+
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp.identify.traces import Batch
+
+
+T = TypeVar("T")
+PRINTED = ("delay", "inertia", "lag", "command_lag")  # effects of a machine that are computed here
+Samples = Float[np.ndarray, " time"]
+
+
+class MachineNumbers(NamedTuple, Generic[T]):
+    """What the numbers of a machine that act here are, or where they stand."""
+
+    delay: T  # s
+    mass: T  # kg
+    lag: T  # s
+
+
+class Motion(NamedTuple):
+    """A stroke and its velocity at the samples and at so many parts of each interval, or derivatives of these."""
+
+    stroke: Samples
+    velocity: Samples
+    fine_stroke: Float[np.ndarray, " fine"]
+    fine_velocity: Float[np.ndarray, " fine"]
+
+    @classmethod
+    def refined(cls, stroke: Samples, velocity: Samples, dt: float, parts: int) -> "Motion":
+        """`rig.marching.finer` by NumPy."""
+        x, v = np.ascontiguousarray(stroke), np.ascontiguousarray(velocity)
+        if parts == 1:
+            return cls(x, v, x, v)
+        return cls(x, v, _refined(x, dt * v, parts), _refined(v, slopes(v), parts))
+
+    def at_parts(self) -> "Motion":
+        """The same, whose samples are the parts."""
+        return self._replace(stroke=self.fine_stroke, velocity=self.fine_velocity)
+
+    def places(self) -> list[int]:
+        """Where the arrays are in memory, which must hold them meanwhile."""
+        return [array.ctypes.data for array in self]
+
+
+class Record(NamedTuple):
+    """What the function of a record takes."""
+
+    motion: Motion
+    by_delay: Motion | None  # its derivatives by the delay; None if there is none
+    parts: int
+    step: float  # s, of a part
+    weight: Samples
+    force: Samples
+    used: int  # samples, as `Row.used`
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """A record of a batch, with what its machine adds."""
+
+    dt: float  # s
+    stroke: Samples
+    velocity: Samples
+    weight: Samples
+    force: Samples
+    parts: int
+    effects: tuple[str, ...]
+
+    @functools.cached_property
+    def used(self) -> int:
+        """The number of samples up to the last one with a weight."""
+        return int(np.flatnonzero(self.weight > 0)[-1]) + 1 if np.any(self.weight > 0) else 0
+
+    @functools.cached_property
+    def still(self) -> Record:
+        """The record without a machine, weighted."""
+        motion = Motion.refined(self.stroke, self.velocity, self.dt, self.parts)
+        return Record(motion, None, self.parts, self.dt / self.parts, self.weight, self.force, self.used)
+
+    def on_machine(self, delay: float) -> Record:
+        """The record later by a delay [s], its force without a weight; at every part of a step before a lag."""
+        motions = [(self.stroke, self.velocity)]
+        if "delay" in self.effects:
+            (x, by_x), (v, by_v) = (delayed(values, delay / self.dt) for values in motions[0])
+            motions = [(x, v), (by_x / self.dt, by_v / self.dt)]
+        first, *others = (Motion.refined(x, v, self.dt, self.parts) for x, v in motions)
+        parts, step = self.parts, self.dt / self.parts
+        if "lag" in self.effects:
+            first, *others = (each.at_parts() for each in (first, *others))
+            parts = 1
+        count = first.stroke.size
+        return Record(first, others[0] if others else None, parts, step, np.ones(count), np.zeros(count), count)
+
+    def shown(
+        self,
+        forces: Float[np.ndarray, "fine columns"],
+        record: Record,
+        numbers: MachineNumbers[float],
+        columns: MachineNumbers[int],
+    ) -> Float[np.ndarray, "time columns"]:
+        """What the force channel shows of forces, the last column, and their derivatives, the others.
+
+        Arguments:
+            forces: of the law in the record, which are changed.
+            record: `on_machine`.
+            numbers: of the machine.
+            columns: of the derivatives by them, −1 where there is none.
+        """
+        if "inertia" in self.effects:
+            acceleration = slopes(record.motion.velocity) / (record.step * record.parts)
+            forces[:, -1] += numbers.mass * acceleration
+            _add(forces, columns.mass, acceleration)
+            if record.by_delay is not None:
+                change = slopes(record.by_delay.velocity) / (record.step * record.parts)
+                _add(forces, columns.delay, numbers.mass * change)
+        if "lag" not in self.effects:
+            return forces
+        forces, by_samples = lagged(forces, numbers.lag / record.step)
+        _add(forces, columns.lag, by_samples / record.step)
+        return forces[:: self.parts]
+
+    def missed(self, shown: Float[np.ndarray, "time columns"]) -> Float[np.ndarray, "time columns"]:
+        """The weighted difference from what was measured, the last column, and its derivatives."""
+        shown[:, -1] -= self.force
+        return np.where(self.weight[:, None] > 0, shown * self.weight[:, None], 0.0)
+
+
+def _add(forces: Float[np.ndarray, "time columns"], column: int, change: Samples) -> None:
+    """Add to the derivatives by a number, if it is free."""
+    if column >= 0:
+        forces[:, column] += change
+
+
+def rows_of(batch: Batch) -> list[Row]:
+    """The records of a batch."""
+    columns = (batch.dt, batch.stroke, batch.velocity, batch.weight, batch.force)
+    arrays = zip(*(np.ascontiguousarray(np.asarray(column)) for column in columns), strict=True)
+    return [Row(float(dt), x, v, w, f, batch.substeps, batch.effects) for dt, x, v, w, f in arrays]
+
+
+def delayed(values: Samples, samples: float) -> tuple[Samples, Samples]:
+    """`rig.sensor.delayed` by NumPy, and its derivative by the number of samples."""
+    last = len(values) - 1
+    wanted = np.arange(len(values)) - samples
+    places = np.clip(wanted, 0.0, last)
+    before = np.clip(places.astype(int), 0, last - 1)
+    s, rises = places - before, slopes(values)
+    ends = (values[before], rises[before], values[before + 1], rises[before + 1])
+    inside = 0.5 * ((wanted >= 0) & (wanted <= last)) + 0.5 * ((wanted > 0) & (wanted < last))
+    return _hermite(ends, s), -inside * _slope_of_hermite(ends, s)
+
+
+def lagged(
+    values: Float[np.ndarray, "time columns"], samples: float
+) -> tuple[Float[np.ndarray, "time columns"], Samples]:
+    """`rig.sensor.lagged` of each column, and the derivative of the last one by the number of samples."""
+    from scipy.signal import lfilter
+
+    there = samples > 1e-3
+    decay = np.exp(-1.0 / samples) if there else 0.0
+    by_decay = decay / samples**2 if there else 0.0
+    mean, by_mean = samples * (1.0 - decay), 1.0 - decay - samples * by_decay
+    later, _ = lfilter([1.0 - mean, mean - decay], [1.0, -decay], values, axis=0, zi=mean * values[:1])
+    last, shown = values[:, -1], later[:, -1]
+    change = np.append(0.0, by_decay * shown[:-1] + (by_mean - by_decay) * last[:-1] - by_mean * last[1:])
+    return later, np.asarray(lfilter([1.0], [1.0, -decay], change))
+
+
+def slopes(values: Samples) -> Samples:
+    """`rig.marching.slopes` by NumPy, for a step of one."""
+    if values.size < 5:
+        return np.gradient(values)
+    inner = (values[:-4] - 8.0 * values[1:-3] + 8.0 * values[3:-1] - values[4:]) / 12.0
+    edge = np.array([[-25.0, 48.0, -36.0, 16.0, -3.0], [-3.0, -10.0, 18.0, -6.0, 1.0]]) / 12.0
+    return np.concatenate([edge @ values[:5], inner, -(edge @ values[:-6:-1])[::-1]])
+
+
+def _hermite(ends: Sequence[np.ndarray], s: np.ndarray) -> np.ndarray:
+    """The cubic at a share s of an interval, from value and rise at its start and at its end."""
+    start, start_rise, stop, stop_rise = ends
+    between = start_rise * (s * (1 - s) ** 2) + stop_rise * (s * s * (s - 1))
+    return start * ((1 + 2 * s) * (1 - s) ** 2) + stop * (s * s * (3 - 2 * s)) + between
+
+
+def _slope_of_hermite(ends: Sequence[np.ndarray], s: np.ndarray) -> np.ndarray:
+    start, start_rise, stop, stop_rise = ends
+    return 6.0 * s * (1 - s) * (stop - start) + start_rise * (1 - s) * (1 - 3 * s) + stop_rise * s * (3 * s - 2)
+
+
+def _refined(values: Samples, rises: Samples, parts: int) -> Float[np.ndarray, " fine"]:
+    """The values at so many parts of each interval, from the rises over one at the samples."""
+    ends = (values[:-1, None], rises[:-1, None], values[1:, None], rises[1:, None])
+    return np.append(np.ravel(_hermite(ends, (np.arange(parts) / parts)[None, :])), values[-1])
