@@ -3,9 +3,9 @@
     python -m benchmarks.first_result [DYNO FILES]
 
 The files, all of one damper and counted positive in rebound, are also fitted at the command line: the first one by the
-laws that suit it, also with a delay of the machine, all of them by every law. Without files there is one, of a virtual damper, written before the clock
-starts. Wall and processor time stand in seconds and in bases, of which one is a new process that imports jax and
-compiles x * x; beside them the number of XLA programs.
+laws that suit it, also with a delay of the machine, all of them by every law. Without files there is one, of a virtual
+damper, written before the clock starts. Wall and processor time stand in seconds and in bases, of which one is a new
+process that imports jax and compiles x * x; beside them the number of XLA programs.
 """
 
 import os

@@ -16,7 +16,6 @@ from jaxdamp.bench.analysis import (
     peak_velocity_points,
     steady_cycles as steady_cycles,
 )
-from jaxdamp.bench.command_steps import CommandStep
 from jaxdamp.bench.contradictions import (
     Contradiction as Contradiction,
     contradictions,
@@ -65,7 +64,7 @@ from jaxdamp.bench.settings import (
 from jaxdamp.bench.units import ratio as ratio
 from jaxdamp.bench.velocity import estimate_velocity
 from jaxdamp.bench.virtual_dyno import VirtualDyno
-from jaxdamp.bench.waveforms import MultiSineTest, TriangleTest
+from jaxdamp.bench.waveforms import CommandStep, MultiSineTest, TriangleTest
 
 
 __all__ = [

@@ -13,8 +13,7 @@ from jaxdamp.bench import clock, sign as signs, stamps
 from jaxdamp.bench.clock import Part, regular_parts
 from jaxdamp.bench.columns import REQUIRED, Choice, Column, find_columns
 from jaxdamp.bench.motion import Samples, cycle_instants
-from jaxdamp.bench.problems import Problems
-from jaxdamp.bench.raw import RawColumn, RawTable
+from jaxdamp.bench.raw import Problems, RawColumn, RawTable
 from jaxdamp.bench.runs import COMMAND_MARK, FILE_MARK, INTEGRATED_MARK, NOTE_MARK, SETTINGS_MARK, BenchRun
 from jaxdamp.bench.velocity import estimate_velocity, integrate_velocity
 

@@ -9,8 +9,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
 from jaxdamp.bench.headers import NOT_MEASURED, ROLES, role_of, signal_unit, split_header, tail_unit, words_in
-from jaxdamp.bench.problems import Problems
-from jaxdamp.bench.raw import RawColumn, RawTable
+from jaxdamp.bench.raw import Problems, RawColumn, RawTable
 from jaxdamp.bench.stamps import is_stamp
 from jaxdamp.bench.units import USUAL, Conversion, conversion, gain_conversion, named_conversion, ratio
 
@@ -69,10 +68,6 @@ def find_columns(table: RawTable, choice: Choice) -> tuple[dict[str, Column], tu
 
     A quantity that a record can do without, velocity, temperature or command, is left out where its column is
     doubtful, and a note says so, unless the caller asked for it.
-
-    Arguments:
-        table: the table read from a file.
-        choice: what the caller says about the columns.
 
     Returns:
         The column of each quantity, and notes.

@@ -13,7 +13,7 @@ from jaxdamp._tables import Column as TableColumn, Table
 from jaxdamp._types import Figure
 from jaxdamp.bench import sign as signs
 from jaxdamp.bench.columns import Choice
-from jaxdamp.bench.problems import Problems
+from jaxdamp.bench.raw import Problems
 from jaxdamp.bench.readers import READERS, Reader, read_tables, with_own
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import BenchSet

@@ -58,21 +58,13 @@ def with_point(cell: str, delimiter: str) -> str:
 
 @dataclass(frozen=True)
 class Layout:
-    """How the rows of a record are divided.
+    """How the rows of a record are divided."""
 
-    Arguments:
-        delimiter: the character between columns.
-        count: number of columns.
-        full: numbers of the columns that hold a number or a time stamp in nearly every row.
-        numeric: numbers of the columns that hold numbers, some perhaps in few rows.
-        score: digits of numbers and time stamps in the rows looked at; the delimiter with most of them is right.
-    """
-
-    delimiter: str
-    count: int
-    full: tuple[int, ...]
-    numeric: tuple[int, ...]
-    score: int
+    delimiter: str  # the character between columns
+    count: int  # number of columns
+    full: tuple[int, ...]  # numbers of the columns that hold a number or a time stamp in nearly every row
+    numeric: tuple[int, ...]  # numbers of the columns that hold numbers, some perhaps in few rows
+    score: int  # digits of numbers and time stamps in the rows looked at; the delimiter with most of them is right
 
     def has_value(self, cell: str) -> bool:
         """Whether a cell holds a number or a time stamp."""
@@ -183,12 +175,6 @@ def columns_of(
     file: Path, numbers: Sequence[int], chunks: Iterable[Sequence[Sequence[str]]], layout: Layout
 ) -> list[RawColumn]:
     """The columns of rows of cells: numbers, what stands in their place, and text.
-
-    Arguments:
-        file: for messages.
-        numbers: number of the line of each row.
-        chunks: the rows, some at a time.
-        layout: which columns hold numbers.
 
     Raises:
         ValueError: a row of another width, or two decimal signs.

@@ -60,10 +60,6 @@ def find_manifest(manifest: str | os.PathLike[str] | bool, paths: Sequence[str |
 def read_manifest(file: Path, keys: Kinds) -> dict[str, Any]:
     """The arguments that a manifest holds.
 
-    Arguments:
-        file: the manifest.
-        keys: what it may hold.
-
     Raises:
         ValueError: no TOML, an unknown key, or a value of the wrong kind, naming file and key.
     """

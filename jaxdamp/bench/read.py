@@ -15,11 +15,9 @@ from jaxdamp.bench.bench_tables import Interpretation, bench_runs
 from jaxdamp.bench.clock import on_one_clock
 from jaxdamp.bench.columns import Choice, is_record
 from jaxdamp.bench.manifest import BENCH_KEYS, RIDE_KEYS, find_manifest, merged, read_manifest
-from jaxdamp.bench.problems import Problems
-from jaxdamp.bench.raw import RawTable
+from jaxdamp.bench.raw import Problems, RawTable
 from jaxdamp.bench.readers import Reader, read_tables, with_own
-from jaxdamp.bench.ride_record import RideRecord
-from jaxdamp.bench.ride_tables import RideInterpretation, ride_record
+from jaxdamp.bench.ride_record import RideInterpretation, RideRecord, ride_record
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import BenchSet
 from jaxdamp.bench.settings import Settings, settings_by_name, settings_in_names

@@ -161,9 +161,6 @@ _IN_NAMES = (  # how adjusters are written in names, and what the numbers are
 def settings_in_name(name: str) -> dict[str, float]:
     """The settings of adjusters that a name states, as workshops write them.
 
-    Arguments:
-        name: of a record, a sheet or a column.
-
     >>> settings_in_name("run3_0.5A"), settings_in_name("C4 R6 hot"), settings_in_name("12clk"), settings_in_name("5mm")
     ({'current': 0.5}, {'compression_clicks': 4.0, 'rebound_clicks': 6.0}, {'clicks': 12.0}, {})
     """
@@ -179,9 +176,6 @@ def settings_in_names(names: Sequence[str]) -> tuple[dict[str, dict], dict[str, 
     """The settings of adjusters in the names of records, and a note for each record that has some.
 
     A setting counts only if every one of several records states it, and not all the same.
-
-    Arguments:
-        names: of the records.
     """
     stated = {name: settings_in_name(name) for name in names}
     keys = [k for k in stated[names[0]] if all(k in found for found in stated.values())] if len(stated) > 1 else []

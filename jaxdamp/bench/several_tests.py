@@ -22,10 +22,6 @@ def tests_apart(table: RawTable, choice: Choice) -> list[RawTable]:
 
     A test ends where the time falls back to where it started and, if there is a column of tests, where its number
     changes.
-
-    Arguments:
-        table: of a file.
-        choice: what the caller says about the columns.
     """
     numbered = _column_of_tests(table)
     ends = _changes(np.asarray(table.columns[numbered].values)) if numbered is not None else _restarts(table, choice)

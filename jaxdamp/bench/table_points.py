@@ -12,8 +12,7 @@ from jaxdamp._checks import ArgumentError, Setting
 from jaxdamp._files import natural_key
 from jaxdamp.bench.columns import Choice, column_of, find_one
 from jaxdamp.bench.headers import role_of, split_header
-from jaxdamp.bench.problems import Problems
-from jaxdamp.bench.raw import RawColumn, RawTable
+from jaxdamp.bench.raw import Problems, RawColumn, RawTable
 from jaxdamp.bench.settings import settings_in_name
 
 
@@ -166,12 +165,7 @@ def _cell(value: object) -> str:
 
 
 def numbers_of(table: RawTable, index: int) -> Points:
-    """A column as it stands, NaN where a cell is empty; text in it is refused.
-
-    Arguments:
-        table: of a file.
-        index: number of the column.
-    """
+    """A column as it stands, NaN where a cell is empty; text in it is refused."""
     raw = table.columns[index]
     wrong = {row: text for row, text in raw.faults.items() if text}
     if wrong:
@@ -182,14 +176,7 @@ def numbers_of(table: RawTable, index: int) -> Points:
 
 
 def in_si(table: RawTable, index: int, role: str, choice: Choice) -> tuple[Points, str]:
-    """A column in SI, NaN where a cell is empty; and its unit.
-
-    Arguments:
-        table: of a file.
-        index: number of the column.
-        role: its quantity.
-        choice: what the caller says about the columns.
-    """
+    """A column in SI, NaN where a cell is empty; and its unit."""
     numbers = numbers_of(table, index)
     column = column_of(table, role, index, choice)
     assert column.conversion is not None

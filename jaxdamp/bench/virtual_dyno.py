@@ -13,13 +13,13 @@ from jaxtyping import Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp.bench.clock import FEWEST, Part, regular_parts
-from jaxdamp.bench.command_steps import CommandedExcitation
 from jaxdamp.bench.motion import Samples
 from jaxdamp.bench.programmes import Excitation
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sensors import Sensors, described
 from jaxdamp.bench.sets import BenchSet
 from jaxdamp.bench.velocity import estimate_velocity
+from jaxdamp.bench.waveforms import CommandedExcitation
 from jaxdamp.dampers import AbstractDamper, Heated, check_commands, require_finite_force
 from jaxdamp.parameters import modules_inside, parameters
 from jaxdamp.rig import Rig

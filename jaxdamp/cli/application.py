@@ -12,7 +12,7 @@ from typer.core import TyperCommand, TyperGroup
 
 
 COMMANDS = {  # along the chain from records to a damper: name and function
-    "demo": "cli.demo.demo",
+    "demo": "cli.chaining.demo",
     "bench": "cli.benching.bench_command",
     "fit": "cli.fitting.fit",
     "fit-vehicle": "cli.vehicle_fitting.fit_vehicle",
@@ -138,7 +138,7 @@ def command(name: str) -> Command:
     target = COMMANDS[name]
 
     def run(*, debug: bool = False, **given: Any) -> None:
-        from jaxdamp.cli import console, early, resuming, showing
+        from jaxdamp.cli import console, early, resuming
 
         with console.plain_errors(debug):
             early.check(name, given)
@@ -148,7 +148,7 @@ def command(name: str) -> Command:
             module, _, function = target.rpartition(".")
             screen = console.Screen()
             arguments = options.build(target, {("screen",): screen, **read})
-            with showing.chosen(given, screen), noted:
+            with console.showing(given, screen), noted:
                 getattr(import_module(f"jaxdamp.{module}"), function)(**arguments)
 
     switch = inspect.Parameter("debug", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=DEBUG)

@@ -1,25 +1,29 @@
-"""`jaxdamp report`: bench records, a vehicle and a road in; laws, rides, a tuned damper and one page out."""
+"""The whole chain: `jaxdamp report` with records, and `jaxdamp demo` on a damper whose truth is known."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
-from jaxdamp import _checks, simulate
+from jaxdamp import _checks, bench, export, roads, simulate, vehicles
 from jaxdamp._display import display
-from jaxdamp.bench import BenchSet
+from jaxdamp._tables import Table
+from jaxdamp.bench import BenchSet, SineTest, VirtualDyno
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.fitting import fit_laws, show, write_fits
+from jaxdamp.cli.fitting import Fitted, fit_laws, show, write_fits
 from jaxdamp.cli.jobs import Output, job, with_step_warnings, without_range_warnings, write_tables
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.records import Reading, decisions, grouped, law_names
 from jaxdamp.cli.riding import Driving, show_ride, unusual
 from jaxdamp.cli.tuning import exit_code_of, tuned, tuning_arguments, write_tuning
 from jaxdamp.cli.vehicle_words import parse_vehicle
-from jaxdamp.dampers import AbstractDamper, not_identified
+from jaxdamp.dampers import AbstractDamper, Besinger, SeriesSpring, not_identified
+from jaxdamp.identify import FitResult
 from jaxdamp.parameters import parameters
-from jaxdamp.report import chain_report, records_table
+from jaxdamp.report import Attempts, Report, chain_report, records_table, ride_tables
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import Response
+from jaxdamp.tune import TuneResult
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -113,3 +117,190 @@ def driven(
                 rides[name], remarks = with_step_warnings(lambda car=car: simulate(car, road, **run))
             screen.points([f"{name}: {remark}" for remark in remarks], style="yellow")
     return rides
+
+
+TRUE = "true damper"
+EVENT = 2.0  # s: length of a ride over a bump
+ISO = "ISO 8608 class C at 20 m/s"
+BUMP = "a bump, 60 mm high and 2 m long, at 10 m/s"
+
+
+def _true_law() -> AbstractDamper:
+    """The damper on the virtual bench: a degressive car damper whose mount yields."""
+    return SeriesSpring(
+        Besinger(
+            compression_rate=1600.0,
+            rebound_rate=4200.0,
+            blow_off_rate=900.0,
+            limit_velocity=0.13,
+            transition_velocity=0.05,
+        ),
+        stiffness=1.5e6,
+        cubic_stiffness=1.2e8,
+    )
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What the demo does; every number of it stands here."""
+
+    law: AbstractDamper = field(default_factory=_true_law)  # the true damper
+    true_name: str = "besinger_series_spring"  # the law of the ladder that has the same parameters
+    laws: tuple[str, ...] = ("linear", "power_law", "segmented_polynomial", "besinger", "besinger_series_spring")
+    tests: tuple[SineTest, ...] = field(default_factory=bench.programmes.paper_000_table_1)
+    held_out: str = "30mm_*"  # pattern of the records that are not fitted, as in Fig. 8 of the paper
+    force_noise: float = 20.0  # of the bench [N]
+    stroke_noise: float = 1e-5  # of the bench [m]
+    duration: float = 10.0  # of the rides [s]
+    tyre_load: float = 1.1  # factor by which the tuning may raise the RMS variation of the tyre load
+    fresh_roads: int = 32  # largest number of roads on which the tuned car is tried that the tuning has not seen
+    seed: int = 0  # of all noise and roads
+
+
+def demo(screen: Screen, *, seed: int = 0, output: Output) -> None:
+    """Run the whole chain on a damper whose truth is known. Needs no input.
+
+    A virtual bench records a known damper; laws are fitted to the files and compared on records that were held out; a
+    quarter car rides on each law; the damper is tuned for comfort; all is written to a folder.
+
+    Arguments:
+        seed: of the noise of the virtual bench and of the roads.
+    """
+    run_demo(screen, Scenario(seed=seed), output)
+
+
+def run_demo(screen: Screen, scenario: Scenario, output: Output) -> None:
+    """Records, fits, rides, a tuning, and a folder with all of it: laws and tables first, then the pictures."""
+    with job(screen, "demo", output) as work:
+        runs = record(screen, scenario, work.results.draft)
+        fits = fit_laws(screen, scenario.laws, runs.without(scenario.held_out), runs.select(scenario.held_out))
+        show(screen, fits)
+        truth = next((rung.result for rung in fits.comparison.rungs if rung.name == scenario.true_name), None)
+        with work.saving("Laws and tables", f"the rides, the tuning, {fits.missing}") as draft:
+            write_fits(draft, fits.comparison, runs, work.attempts)
+            _write_truth(draft, truth, scenario, work.attempts)
+        rides = _rides(screen, scenario, fits)
+        result = None if truth is None else _tuned(screen, truth, scenario)
+        if truth is not None:
+            screen.details(truth_table(scenario, truth))
+        screen.say(truth_verdict(scenario, truth))
+        with work.saving("Rides and tuning") as draft:
+            for number, responses in enumerate(rides.values(), 1):
+                tables = {f"ride_{number}_{name}": table for name, table in ride_tables(responses).items()}
+                write_tables(draft / "tables", tables)
+            if result is not None:
+                write_tuning(draft, result)
+        work.page(_page, scenario, runs, fits, truth, rides, result)
+        target = work.results.target
+    screen.details(screen.times_table())
+    screen.say(f"Open {target / 'report.html'}. The records are files like those of a real bench; fit them yourself:")
+    screen.say(f'  jaxdamp fit {target / "records"} --held-out "{scenario.held_out}" --sign rebound-positive', "bold")
+
+
+def _page(
+    scenario: Scenario,
+    runs: BenchSet,
+    fits: Fitted,
+    truth: FitResult | None,
+    rides: Mapping[str, Mapping[str, Response]],
+    tuning: TuneResult | None,
+    *,
+    folder: Path,
+    attempts: Attempts,
+) -> Report:
+    """The page of the chain, with the truth."""
+    noise = f"sensor noise of {scenario.force_noise:g} N and {1e6 * scenario.stroke_noise:g} µm"
+    page = chain_report(
+        fits.comparison,
+        rides,
+        tuning,
+        title="jaxdamp demo: from bench records to a better damper",
+        sentences=[truth_verdict(scenario, truth)],
+        sheets=False,
+        preflight=bench.preflight(runs),
+        runs=tuple(runs),
+        remarks=[
+            f"A virtual bench recorded a known damper under {len(scenario.tests)} sines, with {noise}. "
+            f"The records {scenario.held_out} were held out of all fits.",
+            f"The true damper: {scenario.law!r}",
+            *fits.failures,
+        ],
+        folder=folder,
+        attempts=attempts,
+    )
+    if truth is not None:
+        page.heading("Was the truth found?")
+        page.table(truth_table(scenario, truth))
+    return page
+
+
+def record(screen: Screen, scenario: Scenario, folder: Path) -> BenchSet:
+    """Run the virtual bench, write its files and read them back."""
+    dyno = VirtualDyno(
+        scenario.law, force_noise=scenario.force_noise, stroke_noise=scenario.stroke_noise, seed=scenario.seed
+    )
+    with screen.stage(f"Virtual bench: {len(scenario.tests)} tests", len(scenario.tests)) as advance:
+        records = dyno.run(scenario.tests, progress=lambda done, of: advance("", done))
+    with screen.stage("Files written and read back"):
+        records.write(folder / "records")
+        return bench.read([folder / "records" / f"{name}.csv" for name in records.names])
+
+
+def _rides(screen: Screen, scenario: Scenario, fits: Fitted) -> dict[str, dict[str, Response]]:
+    """On a random road and over a bump: the true damper, the law with the largest error, and the recommended one."""
+    random = roads.iso8608("C", speed=20.0, seed=scenario.seed)
+    surfaces: dict[str, AbstractRoad] = {ISO: random, BUMP: roads.cosine_bump(0.06, start=0.5, duration=0.2)}
+    comparison = fits.comparison
+    both = (max(comparison.rungs, key=lambda rung: rung.error), comparison.best)
+    cars = {name: _car(law) for name, law in {TRUE: scenario.law, **{r.name: r.result.law for r in both}}.items()}
+    rides = {}
+    for title, road in surfaces.items():
+        whole = driven(screen, cars, road, {"duration": scenario.duration}, f"Quarter car on {title}")
+        end = scenario.duration if title == ISO else min(scenario.duration, EVENT)  # one program for both lengths
+        rides[title] = {name: response.between(0.0, end) for name, response in whole.items()}
+        show_ride(screen, rides[title])
+    return rides
+
+
+def _car(law: AbstractDamper) -> AbstractVehicle:
+    """The corner of a car that is ridden and tuned: 300 kg of body, 1.2 Hz."""
+    return vehicles.presets.quarter_car_mathworks(law)
+
+
+def _tuned(screen: Screen, truth: FitResult, scenario: Scenario) -> TuneResult:
+    """The fitted damper with its coefficients tuned for comfort, tried on roads that the tuning had not seen."""
+    more = f"{100 * (scenario.tyre_load - 1):+.0f}%"
+    screen.say(
+        "For this light car the damper is stiff: it holds the tyre to the road and shakes the body. Its damping "
+        f"coefficients are tuned for comfort, while the RMS variation of the tyre load may grow: {more} at most."
+    )
+    road = roads.iso8608("C", speed=20.0, seed=scenario.seed)
+    limits, run = {"grip": more}, {"duration": scenario.duration, "fresh_roads": scenario.fresh_roads}
+    what = {"metric": "comfort", "vehicle": _car(truth.law), "road": road, "over": ["damper.**rate"]}
+    return tuned(screen, what | {"limits": limits} | run)
+
+
+def truth_table(scenario: Scenario, result: FitResult) -> Table:
+    """The recovered parameters beside the true ones."""
+    return result.table(scenario.law, title=f"Parameters of {scenario.true_name}, fitted and true")
+
+
+def truth_verdict(scenario: Scenario, result: FitResult | None) -> str:
+    """Whether the fit found the truth, in words."""
+    if result is None:
+        return f"{scenario.true_name} could not be fitted."
+    rows = truth_table(scenario, result).records()
+    determined = [row for row in rows if not row["note"]]
+    off = [abs(cell) for cell in (row["(value − true)/se"] for row in determined) if isinstance(cell, float)]
+    if not off:
+        return "None of the parameters is determined by these records."
+    rest = len(rows) - len(determined)
+    blind = f" {rest} more cannot be told from these records, and the fit says so." if rest else ""
+    return f"{len(off)} parameters are determined; they are at most {max(off):.1f} standard errors off.{blind}"
+
+
+def _write_truth(folder: Path, truth: FitResult | None, scenario: Scenario, attempts: Attempts) -> None:
+    with attempts.part("true_law.json"):
+        export.to_json(scenario.law, folder / "true_law.json")
+    if truth is not None:
+        write_tables(folder / "tables", {"parameters_and_truth": truth_table(scenario, truth)})

@@ -1,12 +1,13 @@
-"""What the commands share at the terminal: tables, stages with their progress, errors in one sentence."""
+"""What the commands share at the terminal: tables, stages with their progress, errors in one sentence, units shown."""
 
 import os
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 from unicodedata import category
 
 import typer
@@ -17,11 +18,13 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from jaxdamp._display import display
+from jaxdamp import _checks
+from jaxdamp._display import Display, display, shown_in
+from jaxdamp._documents import read_toml
 from jaxdamp._tables import Column, Table
 from jaxdamp._words import first_upper, raised
 from jaxdamp.cli import interrupt
-from jaxdamp.cli.wording import message
+from jaxdamp.cli.wording import in_command_line, message
 
 
 Advance = Callable[[str, int], None]
@@ -188,3 +191,43 @@ def plain_errors(debug: bool) -> Iterator[None]:
             raise
         screen.print(literal("Error: ", "bold red").append(literal(message(error), "red")))
         raise typer.Exit(2) from error
+
+
+FILE, TABLE = "jaxdamp.toml", "show"
+KEYS = ("units", "sign")
+
+
+@contextmanager
+def showing(given: Mapping[str, Any], screen: Screen) -> Iterator[None]:
+    """Tables, pictures and CSV as the options say, then a file in this folder, then the file of the user."""
+    stated = {key: given[f"show_{key}"] for key in KEYS if given.get(f"show_{key}")}
+    sources = []
+    for file in _files(given.get("files") or ()) if "show_units" in given else ():
+        found = _stated(file)
+        sources += [str(file)] if found.keys() - stated.keys() else []
+        stated = {**found, **stated}
+    display = Display(**stated, wording=in_command_line)
+    if display.described:
+        where = f" (from {' and '.join(sources)})" if sources else ""
+        screen.say(f"{display.described}{where}")
+    with shown_in(display):
+        yield
+
+
+def _files(asked: Any) -> list[Path]:
+    """The files that may hold settings, the nearest first: of this folder, of a folder that is read, of the user."""
+    settings = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config")
+    folders = [Path(), *(path for path in map(Path, asked) if path.is_dir()), settings]
+    return [file for folder in folders if (file := folder / FILE).is_file()]
+
+
+def _stated(file: Path) -> dict[str, str]:
+    """Units and sign in a file."""
+    document = read_toml(file)
+    table = document.get(TABLE, {})
+    if isinstance(document.get("units"), str):  # as a table they are those of the records in its folder
+        _checks.refuse("units", f"stand under [{TABLE}]", f"{document['units']!r} above all tables in {file}")
+    wrong = [key for key in table if key not in KEYS or not isinstance(table[key], str)] if table else []
+    if not isinstance(table, dict) or wrong:
+        _checks.refuse(TABLE, f"hold {' and '.join(KEYS)} as text", f"{table!r} in {file}", 'Such as units = "SI".')
+    return table

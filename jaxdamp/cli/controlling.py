@@ -68,10 +68,6 @@ class Controlling:
 def parse_policy(word: str, car: AbstractVehicle) -> Policy:
     """The policy that a word means, such as "hybrid:gain=3000,share=0.7", or the file of one.
 
-    Arguments:
-        word: name and numbers, or a JSON file.
-        car: for which "lqr" is computed.
-
     >>> from jaxdamp.vehicles.presets import quarter_car_000
     >>> parse_policy("skyhook:gain=2000", quarter_car_000())
     Skyhook(gain=2000.0, lead=0.0)

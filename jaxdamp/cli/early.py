@@ -22,10 +22,6 @@ ROADS = ("iso", "white", "bump")
 def check(command: str, given: Mapping[str, Any]) -> None:
     """Refuse paths that lead nowhere, files that are not JSON, and a folder that may not be written.
 
-    Arguments:
-        command: its name.
-        given: its arguments and options by name, which mean the same in all commands.
-
     Raises:
         ValueError: such a path, file or folder.
     """
@@ -84,14 +80,7 @@ def read_vehicle(path: Path) -> dict[str, Any]:
 
 
 def read_json(argument: str, path: Path, words: str, remedy: str = "") -> None:
-    """Refuse a path where no JSON file is.
-
-    Arguments:
-        argument: that gives the file, for messages.
-        path: of the file.
-        words: what it should hold.
-        remedy: where such a file comes from.
-    """
+    """Refuse a path where no JSON file is."""
     require_file(argument, path, remedy)
     must = f"be {words} as JSON"
     try:

@@ -11,10 +11,9 @@ from jaxdamp.cli.console import Screen
 from jaxdamp.cli.interrupt import Interrupted
 from jaxdamp.cli.jobs import Job, Output, job, write_tables
 from jaxdamp.cli.limits import bounds_in_si
-from jaxdamp.cli.line_fitting import fit_line
+from jaxdamp.cli.line_fitting import fit_line, fit_table, records_of, through_points
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.records import Reading, decisions, grouped, law_names, split
-from jaxdamp.cli.table_fitting import Refused, fit_table, records_of, through_points
 from jaxdamp.cli.vehicle_words import read_law
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Comparison, CrossValidation, Failure, Rung
@@ -126,9 +125,9 @@ def fit(
         Fits(work, names, options, found, remarks, cross_validate, beside).of_all(groups, held)
 
 
-def _given(**options: object) -> list[Refused]:
-    """Options that a kind of fit refuses if they are given."""
-    return [Refused(name, bool(value)) for name, value in options.items()]
+def _given(**options: object) -> list[str]:
+    """The options among these that are given."""
+    return [name for name, value in options.items() if value]
 
 
 def _options(how: Call, rig: Sequence[str]) -> dict[str, Any]:
@@ -174,14 +173,7 @@ class Fits(NamedTuple):
         self.work.attempts.troubles.extend(failed)
 
     def of_group(self, name: str, runs: BenchSet, held_out: BenchSet, later: Sequence[str]) -> None:
-        """Fit one group of records and write its folder, which has the name of the group.
-
-        Arguments:
-            name: of the group; empty if there is only one, which is written without a folder of its own.
-            runs: its records.
-            held_out: the records of all groups that are not fitted.
-            later: the groups that follow.
-        """
+        """Fit one group of records and write its folder, which has the name of the group."""
         screen = self.work.screen
         screen.say()
         if name:
@@ -222,15 +214,6 @@ def fit_laws(
     **options: Any,
 ) -> Fitted:
     """Fit the laws of these names on a test machine, one after the other. Ctrl-C keeps those that are finished.
-
-    Arguments:
-        screen: the terminal.
-        names: of the laws; those that suit the records if there are none.
-        runs: records to fit.
-        held_out: records to score on.
-        rig: effects of the test machine.
-        keep_bad: fit records that contradict each other together.
-        options: as in `identify.fit_each`.
 
     Raises:
         ValueError: records that contradict each other; not one law could be fitted.

@@ -1,6 +1,7 @@
 """What the commands share between their start and their end: where they write, pictures, warnings of rides."""
 
 import contextlib
+import json
 import shutil
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -8,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from jaxdamp._tables import Table
+from jaxdamp._tables import Contents, Table
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.application import command_line
 from jaxdamp.cli.console import Screen
@@ -45,40 +46,22 @@ class Output:
 
 
 class Job(NamedTuple):
-    """A command at work.
+    """A command at work."""
 
-    Attributes:
-        screen: the terminal.
-        results: the folder that is written.
-        attempts: parts of the work that may fail by themselves.
-    """
-
-    screen: Screen
-    results: Results
-    attempts: Attempts
+    screen: Screen  # the terminal
+    results: Results  # the folder that is written
+    attempts: Attempts  # parts of the work that may fail by themselves
 
     @contextlib.contextmanager
     def saving(self, title: str, missing: str = "the pictures and the report") -> Iterator[Path]:
-        """Write what is finished into the folder that this gives; it is put into place, and no `check` stops it.
-
-        Arguments:
-            title: of the stage.
-            missing: what is still to come.
-        """
+        """Write what is finished into the folder that this gives; it is put into place, and no `check` stops it."""
         interrupt.keep()
         with interrupt.saving(), self.screen.stage(title):
             yield self.results.draft
             self.results.publish(missing)
 
     def page(self, report: Callable[..., Report], *contents: Any, part: str = "", **more: Any) -> None:
-        """Draw the pictures and write the page.
-
-        Arguments:
-            report: makes the page.
-            contents: its arguments.
-            part: folder inside the results.
-            more: its further arguments.
-        """
+        """Draw the pictures and write the page."""
         with self.screen.stage("Pictures and report"):
             folder = self.results.draft / part
             folder.mkdir(exist_ok=True)
@@ -90,15 +73,7 @@ class Job(NamedTuple):
 def job(
     screen: Screen, command: str, output: Output, page: Path | None = None, *, resume: bool = False
 ) -> Iterator[Job]:
-    """The results of a command; at the end the terminal says what was written and what could not be made.
-
-    Arguments:
-        screen: the terminal.
-        command: its name.
-        output: the folder to write.
-        page: another place for the page.
-        resume: go on with what an interrupted run had finished.
-    """
+    """The results of a command; at the end the terminal says what was written and what could not be made."""
     target, screen.verbose = output.out or Path(f"jaxdamp-{command}"), output.verbose
     attempts = Attempts(interrupt.check, message)
     folder = results_folder(target, command, replace=output.replace, resume=resume)
@@ -111,11 +86,6 @@ def job(
 @contextlib.contextmanager
 def another_page(page: Path | None, target: Path, *, replace: bool = False) -> Iterator[None]:
     """A copy of the report of a results folder in another place, written when all is done.
-
-    Arguments:
-        page: the file to write; None for no copy.
-        target: the results folder.
-        replace: replace a file that is there.
 
     Raises:
         ValueError: the file is there already, or is a folder.
@@ -134,6 +104,11 @@ def write_tables(folder: Path, tables: Mapping[str, Table]) -> None:
     folder.mkdir(exist_ok=True)
     for name, table in tables.items():
         (folder / f"{name}.csv").write_text(table.to_csv(), encoding="utf-8")
+
+
+def write_json(file: Path, contents: Contents) -> None:
+    """Plain data as JSON."""
+    file.write_text(json.dumps(contents, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
 @contextlib.contextmanager

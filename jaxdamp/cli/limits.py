@@ -20,11 +20,6 @@ GRAVITY = {"g": "g_0"}  # of accelerations, where it is no gram
 def in_si(limits: Mapping[str, Limit], car: AbstractVehicle, *, white: bool) -> tuple[dict[str, Limit], list[str]]:
     """Limits by short name or ride metric with their ends in SI; and what they are, where that is not as written.
 
-    Arguments:
-        limits: as `words.limit` reads them; None is no limit.
-        car: whose metrics they are of.
-        white: whether the road is white.
-
     Raises:
         ValueError: a word that is no metric of the car, a unit of something else.
     """
@@ -45,10 +40,6 @@ def in_si(limits: Mapping[str, Limit], car: AbstractVehicle, *, white: bool) -> 
 def bounds_in_si(bounds: Mapping[str, tuple[Bound, Bound]], models: Iterable[object]) -> dict[str, Any]:
     """Bounds of parameters by path, last part or pattern, with their ends in SI.
 
-    Arguments:
-        bounds: as `words.bound` reads them.
-        models: whose parameters they are of; a bound without a unit may be of something else.
-
     Raises:
         ValueError: a unit of something else, or of no parameter.
     """
@@ -60,10 +51,6 @@ def bounds_in_si(bounds: Mapping[str, tuple[Bound, Bound]], models: Iterable[obj
 
 def axes_in_si(over: Mapping[str, Axis], car: AbstractVehicle) -> dict[str, np.ndarray]:
     """The axes of a sweep by path, last part or pattern, in SI.
-
-    Arguments:
-        over: as `words.axis` reads them.
-        car: whose parameters they are of.
 
     Raises:
         ValueError: a unit of something else, or of no parameter.

@@ -1,22 +1,89 @@
-"""`jaxdamp fit --each`: one law fitted to every damper of a production line, and control charts of its numbers."""
+"""`jaxdamp fit` of a force-velocity table, and of every damper of a production line, with control charts."""
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from jaxdamp import _checks, bench, identify
+from jaxdamp import _checks, bench, dampers, export, identify
 from jaxdamp._checks import ArgumentError
-from jaxdamp.bench import DamperRecords
+from jaxdamp.bench import BenchSet, DamperRecords, ForceVelocityTable
 from jaxdamp.blocks import import_zarr
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.jobs import Output, job, write_tables
 from jaxdamp.cli.limits import bounds_in_si
 from jaxdamp.cli.records import Reading, law_names
-from jaxdamp.cli.table_fitting import Refused
+from jaxdamp.cli.words import words
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import ControlCharts, ManyFits
-from jaxdamp.report import result_report
+from jaxdamp.report import result_report, table_report
 from jaxdamp.rig import Rig
+
+
+THROUGH_POINTS = {"all": dampers.Table, "table": dampers.Table, "spline_table": dampers.SplineTable}
+
+
+def through_points(law: Sequence[str]) -> type[dampers.Table] | type[dampers.SplineTable] | None:
+    """The law that goes through the points of a table, if it is asked for; None for laws to be fitted."""
+    asked = words("law", law)
+    if not asked:
+        return dampers.Table
+    if len(asked) == 1 and asked[0] in THROUGH_POINTS:
+        return THROUGH_POINTS[asked[0]]
+    for name in asked:
+        _checks.one_of("law", name, (*THROUGH_POINTS, *identify.NAMED_LAWS))
+        if name not in identify.NAMED_LAWS or identify.NAMED_LAWS[name].hysteresis:
+            what = "one alone" if name in THROUGH_POINTS else "a law without hysteresis, which a table cannot show"
+            _checks.refuse("law", f"be {what}", repr(name), 'See "jaxdamp laws".')
+    return None
+
+
+def fit_table(
+    screen: Screen,
+    table: ForceVelocityTable,
+    kind: type[dampers.Table] | type[dampers.SplineTable],
+    output: Output,
+    refused: Sequence[str],
+) -> None:
+    """Write the laws through the points of a table: of each setting, and of all as one law of the setting."""
+    for option in refused:
+        _checks.refuse(option, "be left out with a force-velocity table", "given", "Or fit laws with --law.")
+    with job(screen, "fit", output) as work:
+        screen.table(table.table())
+        screen.points(table.notes)
+        with work.saving("Laws and tables") as draft:
+            best = _write_laws(draft, table, kind)
+            write_tables(draft / "tables", {"forces": table.table()})
+            with work.attempts.part("sheet.pdf"):
+                table.plot("sheet").savefig(draft / "sheet.pdf")
+        screen.say(best, style="bold")
+        work.page(table_report, table)
+
+
+def _write_laws(folder: Path, table: ForceVelocityTable, kind: type[dampers.Table] | type[dampers.SplineTable]) -> str:
+    """The files of the laws, and a sentence on what best_law.json is."""
+    (folder / "laws").mkdir()
+    for curve in table.curves:
+        law, name = table.law(curve.setting, kind), _file_name(curve.setting or table.name)
+        export.to_json(law, folder / "laws" / f"{name}.json")
+        at = f"_{name}" if len(table.curves) > 1 else ""
+        export.to_csv(law, folder / f"best_law_force_velocity{at}.csv", curve.velocity)
+    if len(table.curves) > 1 and not table.is_family:
+        return f"The laws of {len(table.curves)} settings are in laws: without numbers they are not one law."
+    export.to_json(table.law(kind=kind), folder / "best_law.json")
+    if not table.is_family:
+        return f"best_law.json goes through the points of {table.name}."
+    ends = f"{table.settings[0]} to {table.settings[-1]}"
+    return f"best_law.json holds settings {ends} as its command: jaxdamp tune --start finds the best one."
+
+
+def _file_name(setting: str) -> str:
+    return "".join(c if c.isalnum() or c in "._+-" else "_" for c in setting)
+
+
+def records_of(screen: Screen, table: ForceVelocityTable) -> BenchSet:
+    """The records that stand for a table in a fit, said at the terminal."""
+    screen.table(table.table())
+    return table.runs()
 
 
 _TAKEN = ("freeze", "bounds", "tie", "weighting", "loss", "priors", "initial_state", "samples_per_cycle", "starts")
@@ -34,23 +101,10 @@ def fit_line(
     output: Output,
     *,
     in_control: int | None,
-    refused: Sequence[Refused],
+    refused: Sequence[str],
 ) -> None:
-    """Fit one law to every damper of a line that is new since the last call, and chart its numbers.
-
-    Arguments:
-        screen: the terminal.
-        files: a folder tree, or a table of files.
-        each: what is a damper, as in `bench.read_dampers`.
-        law: name of the law.
-        rig: what the test machine adds.
-        reading: how the records are read and processed.
-        options: of the fits.
-        output: the folder to write; the fits are kept beside it, in a store of its name.
-        in_control: so many dampers at the beginning give the limits of control charts; None for no charts.
-        refused: options that say nothing of a line.
-    """
-    name = _checked(files, law, [*refused, *(Refused(n, True) for n in options if n not in _TAKEN)])
+    """Fit one law to every damper of a line that is new since the last call, and chart its numbers."""
+    name = _checked(files, law, [*refused, *(option for option in options if option not in _TAKEN)])
     dampers = bench.read_dampers(files[0], each=each, **reading.read.arguments()).process(**reading.processing())
     if in_control is not None:
         _charts({"place": range(len(dampers))}, in_control)  # refuses too few or too many before anything is fitted
@@ -77,11 +131,10 @@ def fit_line(
         work.page(result_report, results[-1])
 
 
-def _checked(files: Sequence[Path], law: Sequence[str], refused: Sequence[Refused]) -> str:
+def _checked(files: Sequence[Path], law: Sequence[str], refused: Sequence[str]) -> str:
     """The name of the law; what a line does not take is refused."""
     for option in refused:
-        if option.given:
-            _checks.refuse(option.name, "be left out where each damper is fitted", "given", "Leave out one of them.")
+        _checks.refuse(option, "be left out where each damper is fitted", "given", "Leave out one of them.")
     names = law_names(law)
     if len(names) != 1:
         _checks.refuse("law", "be one law for all dampers", ", ".join(names) or "left out", 'See "jaxdamp laws".')

@@ -67,19 +67,12 @@ SHORT = {"verbose": "-v"}
 
 
 class Written(NamedTuple):
-    """How an option is written.
+    """How an option is written."""
 
-    Attributes:
-        read: gives its value, from its name and a text, or a list of texts if it may be repeated.
-        metavar: that stands for the value in the help.
-        example: for the help.
-        repeated: whether it may be given several times.
-    """
-
-    read: words.Reader
-    metavar: str
-    example: str = ""
-    repeated: bool = True
+    read: words.Reader  # gives its value, from its name and a text, or a list of texts if it may be repeated
+    metavar: str  # that stands for the value in the help
+    example: str = ""  # for the help
+    repeated: bool = True  # whether it may be given several times
 
 
 ENDS = "be a number, or two as LOWER:UPPER, each with its unit or both in SI"

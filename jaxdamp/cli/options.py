@@ -51,17 +51,11 @@ class Call:
 
 
 class Leaf(NamedTuple):
-    """An argument that is written as one option.
+    """An argument that is written as one option."""
 
-    Attributes:
-        path: the names of the arguments that hold it, one inside the other, and its own.
-        argument: with type, default and text.
-        owner: the function or class whose argument it is.
-    """
-
-    path: tuple[str, ...]
-    argument: Argument
-    owner: str
+    path: tuple[str, ...]  # the names of the arguments that hold it, one inside the other, and its own
+    argument: Argument  # with type, default and text
+    owner: str  # the function or class whose argument it is
 
     @property
     def option(self) -> str:

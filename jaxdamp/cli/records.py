@@ -79,11 +79,6 @@ class Reading:
     def checked(self, screen: Screen, runs: BenchSet, *, refuse: bool = False) -> tuple[BenchSet, Preflight]:
         """The records without an error, and the findings on all of them but those on rest that is cut off.
 
-        Arguments:
-            screen: where the worst findings are printed; with `--verbose` all.
-            runs: the records as they were read.
-            refuse: refuse a record with an error unless bad ones are to be left out or kept.
-
         Raises:
             ValueError: every record has an error, or one has and errors are refused.
         """

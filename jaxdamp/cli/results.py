@@ -59,9 +59,6 @@ class Results:
         A folder that does not exist yet appears with all of it at once. In one that exists, `UNFINISHED.txt` is there
         before the first file is touched, and what an earlier run wrote goes to `.previous` before the first new file
         comes: whenever the process ends, no old file stands beside a new one without this note.
-
-        Arguments:
-            missing: what is still to come, in words, for a file that stays in the folder until all is there.
         """
         self.missing = missing
         with interrupt.undisturbed():
@@ -146,12 +143,6 @@ def results_folder(target: Path, command: str, *, replace: bool = False, resume:
     The target must not exist, or be empty. With `replace`, what the same command wrote there before, and any file that
     has the name of a new one, is moved to `.previous` inside as soon as there is something new; all other files stay.
     Nothing outside the folder is touched, wherever links lead, and no second command writes at the same time.
-
-    Arguments:
-        target: the folder to write.
-        command: name of the command, for the manifest.
-        replace: write into a folder that is not empty.
-        resume: go on with a run of which finished pieces are kept.
 
     Raises:
         ValueError: the target is a file, is not empty, holds the results of another command, is being written by

@@ -33,10 +33,6 @@ _now: dict[str, dict[str, str]] = {}  # the command that is running, in words
 def noted(command: str, given: Mapping[str, object]) -> AbstractContextManager[None]:
     """While this lasts, what the command was given is known; one is refused that would resume another.
 
-    Arguments:
-        command: its name.
-        given: its arguments and options by name.
-
     Raises:
         ValueError: arguments, files or versions differ from those of the run to be resumed.
     """
@@ -99,12 +95,7 @@ def offer(target: Path) -> str:
 
 @contextmanager
 def keeping(target: Path, *, resume: bool) -> Iterator[None]:
-    """While this lasts, the finished pieces of the command are kept, and those of before are taken up.
-
-    Arguments:
-        target: the folder that the command writes.
-        resume: go on with what was kept; it is dropped otherwise.
-    """
+    """While this lasts, the finished pieces of the command are kept, and those of before are taken up."""
     if not _now:  # called from Python, or short
         yield
         return

@@ -1,6 +1,7 @@
-"""`jaxdamp tune`: the free parameters of a vehicle for a ride metric, with limits; and `jaxdamp sweep`."""
+"""`jaxdamp tune`: the free parameters of a vehicle for a ride metric, with limits; `jaxdamp sweep`, also in parts."""
 
 import json
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -9,15 +10,18 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from jaxdamp import Ride, _checks, export, tune
+from jaxdamp import Ride, _checks, export, sweep, tune
+from jaxdamp._checks import ArgumentError, part_of
 from jaxdamp._pieces import kept_file
+from jaxdamp._types import Dataset
+from jaxdamp.blocks import command_of, note_command, stored_blocks
+from jaxdamp.cli import interrupt, resuming
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.controlling import Controlling
-from jaxdamp.cli.jobs import Output, job, write_tables
+from jaxdamp.cli.jobs import Output, job, write_json, write_tables
 from jaxdamp.cli.limits import axes_in_si, bounds_in_si, in_si
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.riding import Driving, beyond_vehicles, unusual
-from jaxdamp.cli.sharing import sweep_part, swept
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, read_module, with_law, write_laws
 from jaxdamp.cli.words import Axis
 from jaxdamp.control import Controlled
@@ -28,6 +32,55 @@ from jaxdamp.roads import WhiteRoad
 from jaxdamp.simulation import stationary_notes
 from jaxdamp.tune import Status, TuneResult, limit_spans
 from jaxdamp.vehicles import AbstractVehicle
+
+
+def sweep_part(screen: Screen, ride: Ride, axes: Mapping[str, np.ndarray], how: Call, store: Path, part: str) -> None:
+    """Compute the blocks of one part, and say how many points the store has."""
+    told = f"Blocks that are done are in {str(store)!r}, and the same command goes on from there."
+    with interrupt.closing(lambda: told):
+        data, remarks = swept(screen, ride, axes, how, store, part)
+    screen.points(remarks, style="yellow")
+    done, count = data.attrs["points_done"], data["failed"].size
+    blocks, (number, _) = stored_blocks(store), part_of("block", part)
+    idle = f"part {part} has no block: the sweep has {blocks}." if number > blocks else f"part {part} is done."
+    rest = "The same command without --block writes the results." if done == count else ""
+    screen.answer(idle, f"{done} of {count} points are in {store}.", rest)
+
+
+def swept(
+    screen: Screen,
+    ride: Ride,
+    axes: Mapping[str, np.ndarray],
+    how: Call,
+    file: Path | None,
+    part: str | None = None,
+) -> tuple[Dataset, list[str]]:
+    """The results of a sweep with what it warns of.
+
+    Raises:
+        ValueError: a store of another sweep, with the options that differ.
+    """
+    stored = file if file is not None and file.suffix == ".zarr" else None
+    now = resuming.given_now()
+    with screen.stage("Driving") as advance, warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+
+        def tell(done: int, total: int) -> None:
+            if stored is not None:
+                note_command(stored, json.dumps(now, ensure_ascii=False))
+            advance(f"{done} of {total} points", done)
+
+        try:
+            data = sweep(ride, axes, **how.arguments(file=file, cluster=part, progress=tell))
+        except ArgumentError as error:
+            if stored is None or error.argument != "file":
+                raise
+            differences = resuming.differences_between(json.loads(command_of(stored) or "{}"), now) if now else []
+            if not differences:
+                raise
+            again = "Give what was given then, name another folder with --out, or delete the store to begin anew."
+            raise ValueError(f"{str(stored)!r} holds another sweep: {'; '.join(differences)}. {again}") from error
+    return data, [str(warning.message) for warning in caught]
 
 
 ON_SCREEN = 30  # points of a sweep that are printed; of more, its smallest results are printed too
@@ -160,8 +213,7 @@ def write_tuning(folder: Path, result: TuneResult[Any]) -> None:
     if result.combinations is not None:
         tables["combinations"] = result.combinations.table()
     write_tables(folder, tables)
-    text = json.dumps(result.to_dict(), indent=1, ensure_ascii=False) + "\n"
-    (folder / "tuning.json").write_text(text, encoding="utf-8")
+    write_json(folder / "tuning.json", result.to_dict())
 
 
 def sweep_command(

@@ -1,6 +1,5 @@
 """`jaxdamp fit-vehicle`: records of a vehicle in; its masses, rates, friction and laws out."""
 
-import json
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -11,14 +10,14 @@ import numpy as np
 from jaxdamp import _checks, bench, export, identify
 from jaxdamp.bench import BenchSet, RideRecord
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.jobs import Output, job, write_tables
+from jaxdamp.cli.jobs import Output, job, write_json, write_tables
 from jaxdamp.cli.limits import bounds_in_si
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.records import decisions
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, write_laws
 from jaxdamp.dampers import CoulombFriction
 from jaxdamp.identify import Failure, VehicleComparison, VehicleFit, VehicleRung
-from jaxdamp.report import ride_records_table, vehicle_comparison_report, vehicle_fit_report
+from jaxdamp.report import failure_sentences, ride_records_table, vehicle_comparison_report, vehicle_fit_report
 from jaxdamp.rig import Rig, Sensor
 from jaxdamp.tune import damper_paths
 from jaxdamp.vehicles import AbstractVehicle, Guide, Guided
@@ -111,7 +110,7 @@ def _compared(
     comparison = VehicleComparison.of(outcomes)
     screen.answer(*comparison.verdict)
     screen.table(comparison.table(), mark=comparison.best.name)
-    screen.points([f"{failure.name} could not be fitted. {failure.reason}" for failure in comparison.failed])
+    screen.points(failure_sentences(comparison))
     return comparison
 
 
@@ -188,8 +187,7 @@ def _write(folder: Path, result: VehicleFit) -> None:
     write_tables(folder, {"parameters": result.table(), "channels": result.scores_table()})
     for record in result.records:
         _write_channels(folder / f"{record.name.replace('/', '_')}_fitted.csv", result, record)
-    text = json.dumps(result.to_dict(), indent=1, ensure_ascii=False) + "\n"
-    (folder / "fit.json").write_text(text, encoding="utf-8")
+    write_json(folder / "fit.json", result.to_dict())
 
 
 def _write_comparison(folder: Path, comparison: VehicleComparison) -> None:
@@ -198,8 +196,7 @@ def _write_comparison(folder: Path, comparison: VehicleComparison) -> None:
     (folder / "vehicles").mkdir()
     for rung in comparison.rungs:
         export.to_json(rung.result.vehicle, folder / "vehicles" / f"{rung.name}.json")
-    text = json.dumps(comparison.to_dict(), indent=1, ensure_ascii=False) + "\n"
-    (folder / "comparison.json").write_text(text, encoding="utf-8")
+    write_json(folder / "comparison.json", comparison.to_dict())
 
 
 def _write_channels(file: Path, result: VehicleFit, record: RideRecord) -> None:

@@ -67,24 +67,12 @@ def parse_vehicle(word: str) -> MakeCar:
 
 
 def read_law(argument: str, path: Path) -> AbstractDamper:
-    """The law of a JSON file.
-
-    Arguments:
-        argument: that gives the file, for messages.
-        path: of the file.
-    """
+    """The law of a JSON file."""
     return read_module(argument, path, AbstractDamper, "a law", FROM_FIT)
 
 
 def read_module(argument: str, path: Path, kinds: type | tuple[type, ...], words: str, remedy: str = "") -> Any:
     """What a JSON file of `export.to_json` holds.
-
-    Arguments:
-        argument: that gives the file, for messages.
-        path: of the file.
-        kinds: allowed classes.
-        words: these in words.
-        remedy: where such a file comes from.
 
     Raises:
         ValueError: no such file, one that is not JSON, or that holds something else.

@@ -71,10 +71,6 @@ def option(argument: str) -> str:
 def option_text(setting: Setting, name: str = "") -> str:
     """An argument with its value as it is given on the command line.
 
-    Arguments:
-        setting: the argument.
-        name: of its option, if that is another one.
-
     >>> option_text(Setting("columns", {"time": None, "stroke": "x mm"}))
     "--columns 'time=none,stroke=x mm'"
     >>> option_text(Setting("sampling_rate")), option_text(Setting("stroke_from_velocity", True))

@@ -26,11 +26,6 @@ def words(option: str, texts: Sequence[str]) -> list[str]:
 def pairs(option: str, texts: Sequence[str], like: str = "NAME=VALUE") -> list[tuple[str, str]]:
     """What "a=1,b=2" assigns, also from several texts; a comma inside a value stays.
 
-    Arguments:
-        option: its name, for messages.
-        texts: as they were typed.
-        like: how it is written, for messages.
-
     >>> pairs("limit", ["travel=0.1,grip=900", "comfort=1"])
     [('travel', '0.1'), ('grip', '900'), ('comfort', '1')]
     >>> pairs("columns", ["time=t,stroke=LVDT, FL"])
@@ -63,11 +58,6 @@ def columns(option: str, given: Sequence[str]) -> list[str | int | None]:
 
 def named(value: Callable[[str], Any], must: str = "be numbers", like: str = "NAME=VALUE") -> Reader:
     """The reader of "a=1,b=2".
-
-    Arguments:
-        value: of a text.
-        must: what a text must be that has none.
-        like: how it is written, for messages.
 
     >>> named(float)("noise", ["stroke=0.0002"])
     {'stroke': 0.0002}

@@ -11,7 +11,7 @@ import numpy as np
 
 from jaxdamp.codegen._elementwise import Rule
 from jaxdamp.codegen._jaxprs import Equation
-from jaxdamp.codegen._program import COUNTER, Assign, Atom, Atoms, Constant, Writer, constant
+from jaxdamp.codegen._program import COUNTER, Assign, Atom, Atoms, Constant, Writer, array_of, constant
 
 
 MOST_WRITTEN_OUT = 256  # products of two matrices; more are computed in loops, since compilers are slow on long texts
@@ -20,10 +20,7 @@ MOST_WRITTEN_OUT = 256  # products of two matrices; more are computed in loops, 
 def constants(value: np.ndarray) -> Atoms:
     """An array of numbers."""
     value = np.asarray(value)
-    result = np.empty(value.shape, object)
-    for index in np.ndindex(*value.shape):
-        result[index] = constant(value[index], value.dtype.name)
-    return result
+    return array_of(value.shape, lambda at: constant(value[at], value.dtype.name))
 
 
 def look_up(writer: Writer, entries: Iterable[Any], index: Atom, dtype: str) -> Atom:
@@ -58,11 +55,12 @@ def _dynamic_slice(writer: Writer, equation: Equation, operands: list[Atoms]) ->
         last = result.shape[axis] - size
         if last:
             rows = np.moveaxis(result, axis, 0)
-            taken = np.empty((size, *rows.shape[1:]), object)
-            for index in np.ndindex(*taken.shape):
-                entries = (rows[(index[0] + k, *index[1:])] for k in range(last + 1))
-                taken[index] = look_up(writer, entries, start.item(), equation.dtype)
-            result = np.moveaxis(taken, 0, axis)
+
+            def taken(at: tuple[int, ...], rows: Atoms = rows, last: int = last, start: Atoms = start) -> Atom:
+                entries = (rows[(at[0] + k, *at[1:])] for k in range(last + 1))
+                return look_up(writer, entries, start.item(), equation.dtype)
+
+            result = np.moveaxis(array_of((size, *rows.shape[1:]), taken), 0, axis)
     return [result]
 
 
@@ -97,10 +95,7 @@ def _reduce(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[A
     axes, count = equation.parameters["axes"], operands[0].ndim
     remaining = [axis for axis in range(count) if axis not in axes]
     rows = operands[0].transpose(*remaining, *axes).reshape((*equation.shape, -1))
-    result = np.empty(equation.shape, object)
-    for index in np.ndindex(*equation.shape):
-        result[index] = _combined(writer, operation, list(rows[index]), equation.dtype, empty)
-    return [result]
+    return [array_of(equation.shape, lambda at: _combined(writer, operation, list(rows[at]), equation.dtype, empty))]
 
 
 def _combined(writer: Writer, operation: str, atoms: list[Atom], dtype: str, empty: float | int) -> Atom:
@@ -140,11 +135,11 @@ def _contracted_last(array: Atoms, batch: tuple[int, ...], axes: tuple[int, ...]
 
 
 def _written_product(writer: Writer, rows: Atoms, columns: Atoms, dtype: str) -> Atoms:
-    result = np.empty((len(rows), len(columns)), object)
-    for i, k in np.ndindex(*result.shape):
-        products = [writer.define("mul", pair, dtype) for pair in zip(rows[i], columns[k], strict=True)]
-        result[i, k] = _combined(writer, "add", products, dtype, 0)
-    return result
+    def total(at: tuple[int, ...]) -> Atom:
+        pairs = zip(rows[at[0]], columns[at[1]], strict=True)
+        return _combined(writer, "add", [writer.define("mul", pair, dtype) for pair in pairs], dtype, 0)
+
+    return array_of((len(rows), len(columns)), total)
 
 
 def _looped_product(writer: Writer, rows: Atoms, columns: Atoms, dtype: str) -> Atoms:
@@ -165,10 +160,9 @@ def _looped_product(writer: Writer, rows: Atoms, columns: Atoms, dtype: str) -> 
             product = writer.define("mul", entries, dtype)
             writer.assign([(total, writer.define("add", (total, product), dtype))])
         writer.put(Assign(products, total, place(i, width, k)))
-    result = np.empty((height, width), object)
-    for number, index in enumerate(np.ndindex(*result.shape)):
-        result[index] = writer.define("look_up", (products, constant(number, COUNTER)), dtype)
-    return result
+    entries = (height, width)
+    numbers = np.arange(height * width).reshape(entries)
+    return array_of(entries, lambda at: writer.define("look_up", (products, constant(numbers[at], COUNTER)), dtype))
 
 
 def _split(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
@@ -205,10 +199,7 @@ def _row(writer: Writer, rows: Atoms, place: Atom, dtype: str) -> Any:
     """An entry along the first axis."""
     if rows.ndim == 1:
         return look_up(writer, rows, place, dtype)
-    result = np.empty(rows.shape[1:], object)
-    for index in np.ndindex(*result.shape):
-        result[index] = look_up(writer, rows[(slice(None), *index)], place, dtype)
-    return result
+    return array_of(rows.shape[1:], lambda at: look_up(writer, rows[(slice(None), *at)], place, dtype))
 
 
 def _scatter(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
@@ -228,12 +219,12 @@ def _scatter(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[
         return [result]
     if not row:
         _refuse("scatter", "a stretch of a vector at a known place")
-    result = np.empty(array.shape, object)
-    for index in np.ndindex(*array.shape):
-        here = writer.define("eq", (place, constant(index[0], place.dtype)), "bool")
-        chosen: Any = here, rows[(0, *index[1:])], array[index]
-        result[index] = writer.define("select", chosen, equation.dtype)
-    return [result]
+
+    def chosen(at: tuple[int, ...]) -> Atom:
+        here: Any = writer.define("eq", (place, constant(at[0], place.dtype)), "bool")
+        return writer.define("select", (here, rows[(0, *at[1:])], array[at]), equation.dtype)
+
+    return [array_of(array.shape, chosen)]
 
 
 def _place_of_extreme(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:

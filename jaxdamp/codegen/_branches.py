@@ -3,7 +3,7 @@
 The rounded knees of a curve, for instance, take four exponentials each, which `jnp.where` drops if their width is zero.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain, groupby
 from typing import NamedTuple
 
@@ -46,6 +46,25 @@ def in_branches(
     """
     changing = {*changing, *(s.target.name for s in statements if isinstance(s, Declare))}
     cases = _cases([*statements, *after], results, changing)
+    runs = _runs(statements, cases)
+    used = [names_in(run) for _, run in runs]
+    shared: set[Variable] = set()
+    written: list[Statement] = []
+    for number, (of, run) in enumerate(runs):
+        if of is None:
+            written += [_loop(s, changing) if isinstance(s, Loop) else s for s in run]
+            continue
+        outside = results.union(names_in(after), *used[:number], *used[number + 1 :])
+        shared |= {s.target for s in run if isinstance(s, Define) and s.target.name in outside}
+        body = list(chain.from_iterable(_assigned(s, shared) for s in run))
+        written.append(Branch(of.condition, [[], body] if of.value else [body, []]))
+    return [*(Declare(v, constant(0, v.dtype)) for v in sorted(shared, key=lambda v: v.name)), *written]
+
+
+def _runs(
+    statements: Sequence[Statement], cases: Mapping[str, Case | None]
+) -> list[tuple[Case | None, list[Statement]]]:
+    """Neighbours of one case, if something costly is in it; all others under None."""
     defined = [s for s in statements if isinstance(s, Define)]
     costly = {cases[s.target.name] for s in defined if s.operation not in CHEAP} - {None}
 
@@ -53,21 +72,7 @@ def in_branches(
         of = cases[statement.target.name] if isinstance(statement, Define) else None
         return of if of in costly else None
 
-    runs = [(of, list(run)) for of, run in groupby(statements, case)]
-    used = [names_in(run) for _, run in runs]
-    declared: list[Declare] = []
-    written: list[Statement] = []
-    for number, (of, run) in enumerate(runs):
-        if of is None:
-            written += [_loop(s, changing) if isinstance(s, Loop) else s for s in run]
-            continue
-        outside = results.union(names_in(after), *used[:number], *used[number + 1 :])
-        shared = {s.target for s in run if isinstance(s, Define) and s.target.name in outside}
-        declared += [Declare(target, constant(0, target.dtype)) for target in shared]
-        body = list(chain.from_iterable(_assigned(s, shared) for s in run))
-        written.append(Branch(of.condition, [[], body] if of.value else [body, []]))
-    declared.sort(key=lambda s: s.target.name)
-    return [*declared, *written]
+    return [(of, list(run)) for of, run in groupby(statements, case)]
 
 
 def _loop(loop: Loop, changing: set[str]) -> Loop:

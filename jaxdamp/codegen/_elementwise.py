@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from jaxdamp.codegen._jaxprs import Equation
-from jaxdamp.codegen._program import Atom, Atoms, Writer, constant
+from jaxdamp.codegen._program import Atom, Atoms, Writer, array_of, constant
 
 
 # Operations of the program have the names of the primitives.
@@ -20,123 +20,102 @@ UNCHANGED = frozenset({"stop_gradient", "copy", "copy_p", "name", "optimization_
 Rule = Callable[[Writer, Equation, list[Atoms]], list[Atoms]]
 
 
-def each(function: Callable[..., Atom], equation: Equation, operands: list[Atoms]) -> list[Atoms]:
-    """The function of every number, operands of one number being repeated."""
-    result = np.empty(equation.shape, object)
-    spread = [np.broadcast_to(operand, equation.shape) for operand in operands]
-    for index in np.ndindex(*equation.shape):
-        result[index] = function(*(operand[index] for operand in spread))
-    return [result]
+def of_each(function: Callable[..., Atom]) -> Rule:
+    """The rule of a primitive by what it gives for every number, operands of one number being repeated."""
+
+    def rule(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
+        spread = [np.broadcast_to(operand, equation.shape) for operand in operands]
+        return [array_of(equation.shape, lambda at: function(writer, equation, *(operand[at] for operand in spread)))]
+
+    return rule
 
 
-def elementwise(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
-    """A primitive that is one operation."""
-    operation = OTHER_NAME.get(equation.name, equation.name)
-    return each(lambda *atoms: writer.define(operation, atoms, equation.dtype), equation, operands)
+@of_each
+def _operation(writer: Writer, equation: Equation, *atoms: Atom) -> Atom:
+    return writer.define(OTHER_NAME.get(equation.name, equation.name), atoms, equation.dtype)
 
 
-def _integer_power(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
+@of_each
+def _integer_power(writer: Writer, equation: Equation, base: Atom) -> Atom:
     exponent, dtype = equation.parameters["y"], equation.dtype
-    one = constant(1, dtype)
+    one = result = constant(1, dtype)
 
     def times(a: Atom, b: Atom) -> Atom:
         return b if a == one else writer.define("mul", (a, b), dtype)
 
-    def power(base: Atom) -> Atom:
-        result, left = one, abs(exponent)
-        while left:
-            result = times(result, base) if left & 1 else result
-            left >>= 1
-            base = times(base, base) if left else base
-        return result if exponent >= 0 else writer.define("div", (one, result), dtype)
-
-    return each(power, equation, operands)
+    left = abs(exponent)
+    while left:
+        result = times(result, base) if left & 1 else result
+        left >>= 1
+        base = times(base, base) if left else base
+    return result if exponent >= 0 else writer.define("div", (one, result), dtype)
 
 
-def _reciprocal_root(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
+@of_each
+def _reciprocal_root(writer: Writer, equation: Equation, a: Atom) -> Atom:
     dtype = equation.dtype
-
-    def reciprocal_root(a: Atom) -> Atom:
-        return writer.define("div", (constant(1, dtype), writer.define("sqrt", (a,), dtype)), dtype)
-
-    return each(reciprocal_root, equation, operands)
+    return writer.define("div", (constant(1, dtype), writer.define("sqrt", (a,), dtype)), dtype)
 
 
-def _logistic(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
+@of_each
+def _logistic(writer: Writer, equation: Equation, a: Atom) -> Atom:
     dtype = equation.dtype
-    one = constant(1, dtype)
-
-    def logistic(a: Atom) -> Atom:
-        power = writer.define("exp", (writer.define("neg", (a,), dtype),), dtype)
-        return writer.define("div", (one, writer.define("add", (one, power), dtype)), dtype)
-
-    return each(logistic, equation, operands)
+    one, power = constant(1, dtype), writer.define("exp", (writer.define("neg", (a,), dtype),), dtype)
+    return writer.define("div", (one, writer.define("add", (one, power), dtype)), dtype)
 
 
-def _one_minus_square(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
+@of_each
+def _one_minus_square(writer: Writer, equation: Equation, a: Atom) -> Atom:
     """1 − x² of JAX 0.12, (1 + x) (1 − x) as there."""
     dtype = equation.dtype
     one = constant(1, dtype)
-
-    def one_minus_square(a: Atom) -> Atom:
-        factors = writer.define("add", (one, a), dtype), writer.define("sub", (one, a), dtype)
-        return writer.define("mul", factors, dtype)
-
-    return each(one_minus_square, equation, operands)
+    factors = writer.define("add", (one, a), dtype), writer.define("sub", (one, a), dtype)
+    return writer.define("mul", factors, dtype)
 
 
-def _polynomial(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
+@of_each
+def _polynomial(writer: Writer, equation: Equation, a: Atom, *coefficients: Atom) -> Atom:
     """A polynomial of JAX 0.12, the lowest coefficient first, by Horner's rule."""
-    dtype = equation.dtype
-
-    def polynomial(a: Atom, *coefficients: Atom) -> Atom:
-        *lower, result = coefficients
-        for coefficient in reversed(lower):
-            result = writer.define("add", (writer.define("mul", (result, a), dtype), coefficient), dtype)
-        return result
-
-    return each(polynomial, equation, operands)
+    *lower, result = coefficients
+    for coefficient in reversed(lower):
+        product = writer.define("mul", (result, a), equation.dtype)
+        result = writer.define("add", (product, coefficient), equation.dtype)
+    return result
 
 
-def _select(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
+@of_each
+def _select(writer: Writer, equation: Equation, which: Atom, *cases: Atom) -> Atom:
     """`select_n(which, case 0, case 1, ...)`, of which most have two cases."""
-
-    def select(which: Atom, *cases: Atom) -> Atom:
-        result = cases[0]
-        for i, case in enumerate(cases[1:], start=1):
-            if which.dtype == "bool":
-                chosen = which
-            else:
-                chosen = writer.define("eq", (which, constant(i, which.dtype)), "bool")
-            result = case if case == result else writer.define("select", (chosen, case, result), equation.dtype)
-        return result
-
-    return each(select, equation, operands)
+    result = cases[0]
+    for i, case in enumerate(cases[1:], start=1):
+        if which.dtype == "bool":
+            chosen = which
+        else:
+            chosen = writer.define("eq", (which, constant(i, which.dtype)), "bool")
+        result = case if case == result else writer.define("select", (chosen, case, result), equation.dtype)
+    return result
 
 
-def _clamp(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
-    def clamp(low: Atom, a: Atom, high: Atom) -> Atom:
-        return writer.define("min", (writer.define("max", (a, low), equation.dtype), high), equation.dtype)
-
-    return each(clamp, equation, operands)
+@of_each
+def _clamp(writer: Writer, equation: Equation, low: Atom, a: Atom, high: Atom) -> Atom:
+    return writer.define("min", (writer.define("max", (a, low), equation.dtype), high), equation.dtype)
 
 
-def _convert(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
-    def convert(a: Atom) -> Atom:
-        return a if a.dtype == equation.dtype else writer.define("convert", (a,), equation.dtype)
-
-    return each(convert, equation, operands)
+@of_each
+def _convert(writer: Writer, equation: Equation, a: Atom) -> Atom:
+    return a if a.dtype == equation.dtype else writer.define("convert", (a,), equation.dtype)
 
 
-def _round(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
+@of_each
+def _round(writer: Writer, equation: Equation, a: Atom) -> Atom:
     operation = "round_half_even" if int(equation.parameters["rounding_method"]) == 1 else "round_half_away"
-    return each(lambda a: writer.define(operation, (a,), equation.dtype), equation, operands)
+    return writer.define(operation, (a,), equation.dtype)
 
 
 RULES: dict[str, Rule] = {
-    **dict.fromkeys(SAME_NAME | set(OTHER_NAME), elementwise),
+    **dict.fromkeys(SAME_NAME | set(OTHER_NAME), _operation),
     **dict.fromkeys(UNCHANGED, lambda writer, e, operands: operands),
-    "square": lambda writer, e, operands: each(lambda a: writer.define("mul", (a, a), e.dtype), e, operands),
+    "square": of_each(lambda writer, equation, a: writer.define("mul", (a, a), equation.dtype)),
     "integer_pow": _integer_power,
     "rsqrt": _reciprocal_root,
     "logistic": _logistic,

@@ -1,6 +1,7 @@
-"""The jaxprs of JAX: the only file that knows how JAX holds a traced function."""
+"""The jaxprs of JAX: the only file that knows how JAX holds a traced function, and whether it is to be printed."""
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -9,6 +10,20 @@ import numpy as np
 from jax.core import ShapedArray, Tracer
 from jax.extend.core import ClosedJaxpr, Jaxpr, Literal, Var, jaxpr_as_fun
 from jaxtyping import Array, ArrayLike, PyTree
+
+
+# Part of the key of compiled functions: what was traced to be printed is not taken for what XLA runs.
+_PRINTING = jax.make_user_context(False)
+
+
+def printing() -> AbstractContextManager[None]:
+    """Functions traced inside are printed."""
+    return _PRINTING(True)
+
+
+def is_printing() -> bool:
+    """Whether the function that is being traced will be printed: it best uses elementary functions of a C library."""
+    return bool(_PRINTING.value)
 
 
 Inner: TypeAlias = Jaxpr | ClosedJaxpr

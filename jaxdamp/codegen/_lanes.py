@@ -7,11 +7,10 @@ from typing import NamedTuple, TypeGuard, final
 import numpy as np
 
 from jaxdamp.codegen import _arrays
-from jaxdamp.codegen._jaxprs import Inner
+from jaxdamp.codegen._jaxprs import Inner, printing
 from jaxdamp.codegen._languages import FUNCTIONS, C
 from jaxdamp.codegen._loop_passes import Kept, kept_values, sums_of_products
 from jaxdamp.codegen._lowering import evaluated
-from jaxdamp.codegen._printing import printing
 from jaxdamp.codegen._program import (
     Atom,
     Atoms,
@@ -21,6 +20,7 @@ from jaxdamp.codegen._program import (
     Table,
     Variable,
     Writer,
+    array_of,
     constant,
     names,
     names_in,
@@ -124,13 +124,14 @@ class _Names:
             return _arrays.constants(operand.value)
         laned = operand.level & OF_POINT > 0
         buffer = of_points if laned else common
-        array = np.empty(operand.shape, object)
-        for index in np.ndindex(*operand.shape):
+
+        def named(_: tuple[int, ...]) -> Variable:
             name = f"{buffer}[{self.counts[buffer]}]" + ("[lane]" if laned else "")
             self.counts[buffer] += 1
             self.levels[name] = operand.level
-            array[index] = Variable(name, "float64")
-        return array
+            return Variable(name, "float64")
+
+        return array_of(operand.shape, named)
 
 
 def _level(atom: Atom | None, levels: dict[str, int]) -> int:

@@ -65,13 +65,7 @@ def _tree(name: str, defined: Mapping[str, Define]) -> list[Define]:
 def sums_of_products(
     statements: Sequence[Define | Table], inside: set[str], results: Iterable[Atom]
 ) -> list[Define | Table]:
-    """The same with products added last to each sum, one after the other, so that each is one multiply-add.
-
-    Arguments:
-        statements: of the body.
-        inside: the names of those that are computed in every step for every point.
-        results: what is carried.
-    """
+    """The same with products added last to each sum, one after the other, so that each is one multiply-add."""
     sums = _Sums(statements, inside, results)
     chains, replaced = sums.chains()
     written: list[Define | Table] = []

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 import jax
@@ -10,8 +11,7 @@ from jax.extend.core import Literal, Var
 from jaxtyping import Array, PyTree
 
 from jaxdamp.codegen import _arrays, _elementwise
-from jaxdamp.codegen._jaxprs import Equation, Inner, equations, literal, opened, scan_sizes, traced
-from jaxdamp.codegen._printing import printing
+from jaxdamp.codegen._jaxprs import Equation, Inner, equations, literal, opened, printing, scan_sizes, traced
 from jaxdamp.codegen._program import (
     COUNTER,
     Assign,
@@ -24,6 +24,7 @@ from jaxdamp.codegen._program import (
     Statement,
     Variable,
     Writer,
+    array_of,
     constant,
     pruned,
 )
@@ -50,10 +51,8 @@ def symbols(name: str, shape: tuple[int, ...] = (), dtype: str = "float64") -> S
         shape: of the input.
         dtype: of its numbers.
     """
-    names = np.empty(shape, object)
-    for place, index in enumerate(np.ndindex(*shape)):
-        names[index] = f"{name}[{place}]" if shape else name
-    return Symbols(names, dtype)
+    places = count()
+    return Symbols(array_of(shape, lambda _: f"{name}[{next(places)}]" if shape else name), dtype)
 
 
 @dataclass(frozen=True)
@@ -98,11 +97,11 @@ def lower(function: Callable[..., PyTree], *arguments: PyTree, finite: bool = Fa
 
 
 def _atoms(leaf: Symbols) -> Atoms:
-    result = np.empty(leaf.names.shape, object)
-    for index in np.ndindex(*leaf.names.shape):
+    def atom(index: tuple[int, ...]) -> Atom:
         name: object = leaf.names[index]
-        result[index] = name if isinstance(name, Constant) else Variable(str(name), leaf.dtype)
-    return result
+        return name if isinstance(name, Constant) else Variable(str(name), leaf.dtype)
+
+    return array_of(leaf.names.shape, atom)
 
 
 def evaluated(writer: Writer, inner: Inner, operands: list[Atoms]) -> list[Atoms]:
@@ -185,7 +184,9 @@ def _scan(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Ato
     rows = [_tables(writer, array, length) for array in operands[second:]]
     now = _declared(writer, equation, operands[first:second])
     each_step = list(zip(equation.shapes, equation.dtypes, strict=True))[carried:]
-    saved = [_saved(writer, shape[1:], dtype, length) for shape, dtype in each_step]
+    saved = [
+        array_of(shape[1:], lambda _, dtype=dtype: writer.declare(dtype, size=length)) for shape, dtype in each_step
+    ]
     with writer.counted(length) as count:
         place = writer.define("sub", (constant(length - 1, COUNTER), count), COUNTER) if p["reverse"] else count
         here = [_entries(writer, tables, place) for tables in rows]
@@ -214,18 +215,12 @@ def _written_out(writer: Writer, equation: Equation, operands: list[Atoms], ends
 
 def _read(writer: Writer, arrays: Atoms, length: int) -> Atoms:
     """What a scan has saved, the steps first."""
-    result = np.empty((length, *arrays.shape), object)
-    for place, *index in np.ndindex(*result.shape):
-        result[(place, *index)] = _entry(writer, arrays[tuple(index)], constant(place, COUNTER))
-    return result
+    return array_of((length, *arrays.shape), lambda at: _entry(writer, arrays[at[1:]], constant(at[0], COUNTER)))
 
 
 def _entries(writer: Writer, tables: Atoms, place: Atom) -> Atoms:
     """The entry at a place of each table."""
-    result = np.empty(tables.shape, object)
-    for index in np.ndindex(*tables.shape):
-        result[index] = _entry(writer, tables[index], place)
-    return result
+    return array_of(tables.shape, lambda at: _entry(writer, tables[at], place))
 
 
 def _entry(writer: Writer, table: Any, place: Atom) -> Atom:
@@ -234,19 +229,12 @@ def _entry(writer: Writer, table: Any, place: Atom) -> Atom:
 
 def _tables(writer: Writer, array: Atoms, length: int) -> Atoms:
     """One table over the steps of a scan for each number of a step."""
-    result = np.empty(array.shape[1:], object)
-    for index in np.ndindex(*array.shape[1:]):
-        entries = [array[(k, *index)] for k in range(length)]
-        result[index] = writer.table(entries, entries[0].dtype)
-    return result
 
+    def table(at: tuple[int, ...]) -> Variable:
+        entries: list[Any] = [array[(k, *at)] for k in range(length)]
+        return writer.table(entries, entries[0].dtype)
 
-def _saved(writer: Writer, shape: tuple[int, ...], dtype: str, length: int) -> Atoms:
-    """One array over the steps of a scan for each number of a step."""
-    result = np.empty(shape, object)
-    for index in np.ndindex(*shape):
-        result[index] = writer.declare(dtype, size=length)
-    return result
+    return array_of(array.shape[1:], table)
 
 
 def _declared(writer: Writer, equation: Equation, start: list[Atoms] | None) -> list[Atoms]:
@@ -254,11 +242,8 @@ def _declared(writer: Writer, equation: Equation, start: list[Atoms] | None) -> 
     results = []
     kinds = list(zip(equation.shapes, equation.dtypes, strict=True))
     for k, (shape, dtype) in enumerate(kinds if start is None else kinds[: len(start)]):
-        result = np.empty(shape, object)
-        for index in np.ndindex(*shape):
-            first: Any = None if start is None else start[k][index]
-            result[index] = writer.declare(dtype, first)
-        results.append(result)
+        first = np.full(shape, None) if start is None else start[k]
+        results.append(array_of(shape, lambda at, dtype=dtype, first=first: writer.declare(dtype, first[at])))
     return results
 
 

@@ -94,6 +94,14 @@ Atoms: TypeAlias = npt.NDArray[np.object_]  # an array of JAX: one atom for each
 COUNTER = "int32"  # the type of what counts the rounds of a loop
 
 
+def array_of(shape: tuple[int, ...], entry: Callable[[tuple[int, ...]], object]) -> Atoms:
+    """An array of what a function gives at each place."""
+    result = np.empty(shape, object)
+    for index in np.ndindex(*shape):
+        result[index] = entry(index)
+    return result
+
+
 def constant(value: object, dtype: str) -> Constant:
     """A number of a type."""
     number = np.dtype(dtype).type(value)
@@ -263,7 +271,7 @@ def pruned(statements: list[Statement], needed: set[str]) -> list[Statement]:
 
 def _pruned_statement(statement: Statement, needed: set[str]) -> Statement | None:
     if isinstance(statement, Loop):
-        if not needed & _assigned(statement.body):
+        if not needed & written([statement]):
             return None
         while True:  # what an earlier statement of the body uses may come from a later one, a round before
             before = len(needed)
@@ -279,17 +287,17 @@ def _pruned_statement(statement: Statement, needed: set[str]) -> Statement | Non
     return statement
 
 
-def _assigned(statements: list[Statement]) -> set[str]:
-    """The names of the variables that are assigned."""
-    assigned: set[str] = set()
+def written(statements: Iterable[Statement]) -> set[str]:
+    """The names of the variables that statements define or assign, those inside loops and branches too."""
+    targets: set[str] = set()
     for statement in statements:
         if isinstance(statement, Loop):
-            assigned |= _assigned(statement.body)
+            targets |= written(statement.body)
         elif isinstance(statement, Branch):
-            assigned = assigned.union(*map(_assigned, statement.bodies))
-        elif isinstance(statement, Assign):
-            assigned.add(statement.target.name)
-    return assigned
+            targets = targets.union(*map(written, statement.bodies))
+        elif not isinstance(statement, Leave):
+            targets.add(statement.target.name)
+    return targets
 
 
 def operands_of(statement: Define | Declare | Table | Assign | Leave) -> list[Atom | None]:

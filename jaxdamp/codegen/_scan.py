@@ -11,11 +11,9 @@ from jax.custom_batching import custom_vmap
 from jax.extend.core import ClosedJaxpr
 from jaxtyping import Array, PyTree
 
-from jaxdamp.codegen._cuda import on_gpu, registered_on_gpu
-from jaxdamp.codegen._jaxprs import called, known, with_constants_as_inputs
+from jaxdamp.codegen._jaxprs import called, known, printing, with_constants_as_inputs
 from jaxdamp.codegen._lanes import OF_POINT, OF_STEP, Loop, Operand, lanes_in_c
-from jaxdamp.codegen._native import compiled_by, registered
-from jaxdamp.codegen._printing import printing
+from jaxdamp.codegen._native import compiled_by, on_gpu, registered, registered_on_gpu
 
 
 Lanes: TypeAlias = Sequence[bool]  # whether each array has one number, or array, for each point

@@ -11,7 +11,7 @@ from jaxtyping import Array, PyTree
 from jaxdamp.codegen._branches import in_branches
 from jaxdamp.codegen._languages import C
 from jaxdamp.codegen._lowering import Program, Symbols, lower, symbols
-from jaxdamp.codegen._program import Atom, Branch, Define, Leave, Loop, Statement, Variable, names, operands_of
+from jaxdamp.codegen._program import Atom, Define, Statement, Variable, names, names_in, written
 
 
 class Signature(NamedTuple):
@@ -105,8 +105,8 @@ def _text(signature: Signature, program: Program, numbers: set[str], of_numbers:
     before, once = _hoisted(once, set(numbers))
     known = numbers | {statement.target.name for statement in before}
     before_lane, lane = _hoisted(lane, known | of_numbers)
-    used = names([*value, *slope]).union(*map(_reads, once), *map(_reads, lane))
-    if names(value) & set().union(*map(_writes, lane)):
+    used = names([*value, *slope]) | names_in([*once, *lane])
+    if names(value) & written(lane):
         raise NotImplementedError("A value is computed together with its derivatives.")
     once = in_branches(once, lane, names([*value, *slope]))
     stored = [s.target for s in before if s.target.name in used]
@@ -153,25 +153,9 @@ def _put(atoms: Sequence[Atom], targets: Sequence[str], name: str, depth: int) -
     return before + [f"{space}{target} = {name}{i};" for i, target in enumerate(targets)]
 
 
-def _reads(statement: Statement) -> set[str]:
-    if isinstance(statement, Loop):
-        return set().union(*map(_reads, statement.body))
-    if isinstance(statement, Branch):
-        return names([statement.case]).union(*(_reads(inner) for body in statement.bodies for inner in body))
-    return names(operands_of(statement))
-
-
-def _writes(statement: Statement) -> set[str]:
-    if isinstance(statement, Loop):
-        return set().union(*map(_writes, statement.body))
-    if isinstance(statement, Branch):
-        return set().union(*(_writes(inner) for body in statement.bodies for inner in body))
-    return set() if isinstance(statement, Leave) else {statement.target.name}
-
-
 def _split(statements: Sequence[Statement], lanes: set[str]) -> tuple[list[Statement], list[Statement]]:
     """Statements that no derivative enters, and the others; a loop assigns variables that were declared before it."""
-    pairs, entered = [(_reads(s), _writes(s)) for s in statements], set(lanes)
+    pairs, entered = [(names_in([s]), written([s])) for s in statements], set(lanes)
     while True:
         count = len(entered)
         for reads, writes in pairs:
@@ -190,7 +174,7 @@ def _hoisted(statements: Sequence[Statement], known: set[str]) -> tuple[list[Def
     later: list[Statement] = []
     for statement in statements:
         kinds = ("float64", "bool")
-        if isinstance(statement, Define) and statement.target.dtype in kinds and _reads(statement) <= known:
+        if isinstance(statement, Define) and statement.target.dtype in kinds and names_in([statement]) <= known:
             early.append(statement)
             known.add(statement.target.name)
         else:

@@ -15,8 +15,7 @@ from jaxdamp._types import Scalar
 from jaxdamp.codegen import Program, lower
 from jaxdamp.control import Controlled, ControlLoop, Flags, Sensors
 from jaxdamp.export._law_program import LawNumber
-from jaxdamp.export._prepared_program import Numbers, PreparedProgram
-from jaxdamp.export._vehicle_program import VehicleProgram
+from jaxdamp.export._vehicle_program import Numbers, PreparedProgram, VehicleProgram
 from jaxdamp.simulation import ControlledStepper, Controller, RoadInput, StepState
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -79,10 +78,6 @@ class ControlledProgram(VehicleProgram):
     """A vehicle with its controller, whose steps are those of `simulate`: instants and steps are the same.
 
     Behind the states the carry c has what the controller carries, and as its last number the steps since a sample.
-
-    Arguments:
-        vehicle: the controlled vehicle.
-        dtype: as in `VehicleProgram`.
 
     Attributes:
         delay: from a sample to its command [s].

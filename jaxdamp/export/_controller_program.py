@@ -18,8 +18,7 @@ from jaxdamp.control import Controlled, ControlLoop, ControlState, Sampler, Sign
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.export._controlled_program import Clock, ControlledProgram, names_in, with_first_commands, with_sensors
 from jaxdamp.export._law_program import LawProgram
-from jaxdamp.export._prepared_program import Numbers, PreparedProgram
-from jaxdamp.export._vehicle_program import VehicleProgram
+from jaxdamp.export._vehicle_program import Numbers, PreparedProgram, VehicleProgram
 from jaxdamp.parameters import parameters
 from jaxdamp.vehicles import AbstractVehicle, LinearMap
 
@@ -111,10 +110,6 @@ class ControllerProgram(PreparedProgram):
 
     Noise and errors of sensors are no part of it, nor is the delay; the sensors' filter is. The last number of the
     carry c are the steps since a sample.
-
-    Arguments:
-        vehicle: the controlled vehicle.
-        dtype: as in `VehicleProgram`.
 
     Attributes:
         dampers: names of those that it commands.
@@ -241,13 +236,7 @@ def _decisions(state: ControllerState) -> Array:
 def program_of(
     law: AbstractDamper | AbstractVehicle, part: str, dtype: str = "float64"
 ) -> LawProgram | VehicleProgram | ControllerProgram:
-    """What is printed of a law, of a vehicle, or of the controller of a vehicle.
-
-    Arguments:
-        law: any law or vehicle.
-        part: "whole" or "controller".
-        dtype: the type of all numbers.
-    """
+    """What is printed of a law, of a vehicle, or of the controller of a vehicle."""
     _checks.one_of("part", part, ("whole", "controller"))
     if isinstance(law, Controlled):
         if part == "controller":

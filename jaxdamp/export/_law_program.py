@@ -2,7 +2,7 @@
 
 import dataclasses
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -75,23 +75,46 @@ def identifier(path: str) -> str:
     return f"{name}_" if name in _RESERVED or not name else f"_{name}" if name[0].isdigit() else name
 
 
-class LawProgram:
+class AbstractProgram:
+    """A law or a vehicle whose functions can be printed.
+
+    Arguments:
+        model: the law or the vehicle.
+        dtype: the type of all numbers, "float64" or "float32".
+        member: what the language writes between `p` and the name of a number: "->" in C, "." in JavaScript.
+
+    Attributes:
+        numbers: its parameters and settings.
+    """
+
+    def __init__(self, model: eqx.Module, dtype: str = "float64", member: str = "->") -> None:
+        _checks.one_of("precision", dtype, ("float64", "float32"))
+        self._model, self.dtype, self.member = model, dtype, member
+        self.numbers = law_numbers(model)
+
+    def _with_numbers(self, values: Sequence[Array]) -> Any:
+        """The model with other numbers, in the order of `numbers`."""
+        model = jax.tree.map(lambda a: jnp.asarray(a, self.dtype) if eqx.is_inexact_array(a) else a, self._model)
+        return with_values(model, {n.path: value for n, value in zip(self.numbers, values, strict=True)})
+
+    def values(self, owner: str = "p") -> PyTree[Symbols]:
+        """All numbers, as members of an object of the program."""
+        return [symbols(f"{owner}{self.member}{n.name}", n.value.shape, self.dtype) for n in self.numbers]
+
+    def _symbols(self, name: str) -> Symbols:
+        return symbols(name, (), self.dtype)
+
+
+class LawProgram(AbstractProgram):
     """A law whose functions can be printed.
 
     Attributes:
-        law: the law.
-        numbers: its parameters and settings.
         states: the number of its states.
-        dtype: the type of all numbers, "float64" or "float32".
-        member: what the language writes between `p` and the name of a number: "->" in C, "." in JavaScript.
     """
 
     def __init__(self, law: AbstractDamper, dtype: str = "float64", member: str = "->") -> None:
-        _checks.one_of("precision", dtype, ("float64", "float32"))
-        self.law = law
-        self.numbers = law_numbers(self.law)
-        self.states = int(law.initial_state().size)
-        self.dtype, self.member = dtype, member
+        super().__init__(law, dtype, member)
+        self.law, self.states = law, int(law.initial_state().size)
 
     @cached_property
     def force(self) -> Program:
@@ -158,8 +181,7 @@ class LawProgram:
 
     def law_of(self, values: list[Array]) -> AbstractDamper:
         """The law with other numbers, in the order of `numbers`."""
-        law = jax.tree.map(lambda a: jnp.asarray(a, self.dtype) if eqx.is_inexact_array(a) else a, self.law)
-        return with_values(law, {n.path: value for n, value in zip(self.numbers, values, strict=True)})
+        return self._with_numbers(values)
 
     def _force(self, values: list[Array], x: Array, v: Array, state: Array) -> Array:
         return self.law_of(values).force(x, v, state)
@@ -179,12 +201,5 @@ class LawProgram:
         names = (f"{d}{name}" for name in ("x0", "v0", "x1", "v1"))
         return self.values(f"{d}p"), *map(self._symbols, names), self._symbols("dt"), self._state(d)
 
-    def values(self, owner: str = "p") -> list[Symbols]:
-        """All numbers, as members of an object of the program."""
-        return [symbols(f"{owner}{self.member}{n.name}", n.value.shape, self.dtype) for n in self.numbers]
-
     def _state(self, d: str) -> Symbols:
         return symbols(f"{d}state", (self.states,), self.dtype)
-
-    def _symbols(self, name: str) -> Symbols:
-        return symbols(name, (), self.dtype)

@@ -13,8 +13,7 @@ from jaxdamp import _checks
 from jaxdamp.codegen import Program, Symbols, symbols
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.export._law_program import LawNumber, LawProgram
-from jaxdamp.export._prepared_program import FlatTree, Numbers
-from jaxdamp.export._vehicle_program import VehicleProgram, road_input
+from jaxdamp.export._vehicle_program import FlatTree, Numbers, VehicleProgram, road_input
 from jaxdamp.parameters import get, modules_inside, with_values
 from jaxdamp.simulation import MetricObserver
 from jaxdamp.vehicles import AbstractVehicle, Drawing, matrix, refuse_controller

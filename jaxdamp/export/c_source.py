@@ -13,12 +13,11 @@ from jaxdamp._field_types import check_module
 from jaxdamp._writing import write_whole
 from jaxdamp.control import Signals
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.export._c_text import DERIVATIVES, INCLUDES, array_text, law_source
+from jaxdamp.export._c_text import DERIVATIVES, INCLUDES, array_text, controller_source, law_source, vehicle_source
 from jaxdamp.export._controlled_program import ControlledProgram
 from jaxdamp.export._controller_program import ControllerProgram, program_of
 from jaxdamp.export._law_program import LawProgram, identifier
 from jaxdamp.export._vehicle_program import VehicleProgram
-from jaxdamp.export._vehicle_text import controller_source, vehicle_source
 from jaxdamp.rig import respond
 from jaxdamp.roads import from_profile
 from jaxdamp.simulation import simulate, substeps_needed

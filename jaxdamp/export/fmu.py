@@ -21,12 +21,11 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.export._c_text import law_source
+from jaxdamp.export._c_text import controller_source, law_source, vehicle_source
 from jaxdamp.export._controlled_program import ControlledProgram
 from jaxdamp.export._controller_program import ControllerProgram, program_of
 from jaxdamp.export._law_program import LawNumber, LawProgram, identifier
 from jaxdamp.export._vehicle_program import VehicleProgram
-from jaxdamp.export._vehicle_text import controller_source, vehicle_source
 from jaxdamp.simulation import substeps_needed
 from jaxdamp.vehicles import AbstractVehicle
 

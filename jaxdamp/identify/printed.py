@@ -8,7 +8,7 @@ for each reason.
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import jax
 import numpy as np
@@ -155,24 +155,30 @@ def evaluator(free: FreeParameters, residuals: Sequence[AbstractResiduals]) -> E
     if reason:
         say(f"Computed by XLA: {reason}.")
         return None
-    taken_tree = _taken(free)
-    model = free.build(free.values)  # with the values that are tied to others
-    places, rows, offset, first = [], [], 0, None
-    for batch in batches:
-        # values that the records state take no free number
-        mine = with_values(taken_tree, {path: np.asarray(-1.0) for path in batch.fixed})
-        marked = _numbers_of(dataclasses.replace(batch, fixed={}), mine, _blank(plain_rig()))
-        for row, numbers, taken in zip(rows_of(batch), _numbers_of(batch, model), marked, strict=True):
-            first = first or numbers
-            places.append({i for i, array in enumerate(taken.arrays) if np.any(array >= 0)})
-            rows.append((offset, row, numbers.flat, taken.flat.astype(np.int64)))
-            offset += batch.stroke.shape[1]
-    law = None if first is None else printed_law(first, set().union(*places))
-    if law is None or first is None:
+    model, taken_tree = free.build(free.values), _taken(free)  # with the values that are tied to others
+    each = [record for batch in batches for record in _with_numbers(batch, model, taken_tree)]
+    if not each:
+        return None
+    first = each[0][1]
+    law = printed_law(first, {i for *_, taken in each for i, array in enumerate(taken.arrays) if np.any(array >= 0)})
+    if law is None:
         return None
     ends = np.cumsum([array.size for array in first.arrays])
     parts = tuple(slice(int(ends[i]) - first.arrays[i].size, int(ends[i])) for i in law.free)
-    return Evaluator(law, rows, offset, free.values.size, parts)
+    places = np.cumsum([0, *(row.weight.size for row, *_ in each)]).tolist()
+    rows = [
+        (place, row, numbers.flat, taken.flat.astype(np.int64))
+        for place, (row, numbers, taken) in zip(places[:-1], each, strict=True)
+    ]
+    return Evaluator(law, rows, places[-1], free.values.size, parts)
+
+
+def _with_numbers(batch: Batch, model: Model, taken: PyTree) -> Iterator[tuple[Row, LawNumbers, LawNumbers]]:
+    """The records of a batch with the numbers of their laws, and with the number of the free value that each takes."""
+    # values that the records state take no free number
+    mine = with_values(taken, {path: np.asarray(-1.0) for path in batch.fixed})
+    marked = _numbers_of(dataclasses.replace(batch, fixed={}), mine, _blank(plain_rig()))
+    return zip(rows_of(batch), _numbers_of(batch, model), marked, strict=True)
 
 
 def _taken(free: FreeParameters) -> PyTree:

@@ -4,7 +4,8 @@ import ctypes
 import functools
 import logging
 import threading
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable, Sequence
+from typing import NamedTuple
 
 import jax
 import numpy as np
@@ -80,6 +81,49 @@ def numbers_on_rig(model: Model, rig: Rig | None = None) -> LawNumbers:
     return numbers_of(OnRig(law_of(model), rig_of(model) or rig or plain_rig()))
 
 
+class _Printed(NamedTuple):
+    """A function of a law before it is printed: of its arrays, its states, and the other arguments."""
+
+    function: Callable[..., Array]
+    results: tuple[list[str], list[str]]  # texts of values and of their derivatives in lane k
+    states: int = 0
+    rest: tuple[str, ...] = ()
+
+    def text(self, name: str, shapes: Sequence[tuple[int, ...]], free: Sequence[int], moves: bool) -> str:
+        """In C; with `moves`, the motion has derivatives."""
+        signature = Signature(name, _ARGUMENTS[name], *self.results)
+        still = Symbols(np.array(Constant("0.0", "float64"), object))  # the step h of time
+        of_rest = [still if each == "h" else symbols(f"D{each}") for each in self.rest if moves]
+        return with_slopes(
+            signature, self.function, shapes, free, self.states, rest=list(map(symbols, self.rest)), moves=of_rest
+        )
+
+
+def _functions(numbers: LawNumbers, states: int, conditions: int) -> dict[str, _Printed]:
+    """What is printed of a law on its machine."""
+
+    def force(arrays: list[Array], s: Array, x: Array, v: Array) -> Array:
+        law, rig = numbers.built(arrays).law, numbers.built(arrays).rig
+        assert rig is not None
+        gas, friction = gas_and_friction(rig, x, v)
+        return law.force(x - rig.stroke_offset, v, s) + gas + friction + rig.force_offset
+
+    def advance(arrays: list[Array], s: Array, x0: Array, v0: Array, x1: Array, v1: Array, h: Array) -> Array:
+        law, rig = numbers.built(arrays).law, numbers.built(arrays).rig
+        assert rig is not None
+        return law.advance(x0 - rig.stroke_offset, v0, x1 - rig.stroke_offset, v1, s, h)
+
+    def each(name: str, count: int) -> tuple[list[str], list[str]]:
+        return [f"{name}[{i}]" for i in range(count)], [f"d{name}[{i}][k]" for i in range(count)]
+
+    of_conditions = _Printed(lambda arrays, s: margins(numbers.built(arrays)), each("m", conditions))
+    return {
+        "begin": _Printed(lambda arrays, s: numbers.built(arrays).law.initial_state(), each("s", states)),
+        "force": _Printed(force, (["*F"], ["dF[k]"]), states, ("x", "v")),
+        "advance": _Printed(advance, each("s", states), states, ("x0", "v0", "x1", "v1", "h")),
+    } | ({"margins": of_conditions} if conditions else {})
+
+
 class PrintedLaw:
     """The C functions of a structure of a law, and which arrays of its numbers they are differentiated by."""
 
@@ -89,54 +133,23 @@ class PrintedLaw:
         self.slopes = sum(numbers.arrays[i].size for i in free)
         self.lanes = LANES * max(-(-self.slopes // LANES), 1)
         self.states = int(jax.eval_shape(lambda: law_of(model).initial_state()).size)
-        self.conditions = (
-            int(jax.eval_shape(lambda: margins(model)).size)
-            if any(law.has_conditions() for _, law in laws_inside(model))
-            else 0
-        )
+        conditional = any(law.has_conditions() for _, law in laws_inside(model))
+        self.conditions = int(jax.eval_shape(lambda: margins(model)).size) if conditional else 0
         ends = np.cumsum([0, *(array.size for array in numbers.arrays)])
         rig = numbers.built([int(end) for end in ends[:-1]]).rig  # the place of each number
         self._machine = MachineNumbers(*map(int, (rig.force_delay, rig.moving_mass, rig.force_lag)))
-        lanes = np.concatenate([ends[:0], *(np.arange(ends[i], ends[i + 1]) for i in free)])
-        delay = np.flatnonzero(lanes == self._machine.delay)
-        m, printed = self.states, functools.partial(with_slopes, shapes=shapes, free=free)
-
-        def force(arrays: list[Array], s: Array, x: Array, v: Array) -> Array:
-            law, rig = numbers.built(arrays).law, numbers.built(arrays).rig
-            assert rig is not None
-            gas, friction = gas_and_friction(rig, x, v)
-            return law.force(x - rig.stroke_offset, v, s) + gas + friction + rig.force_offset
-
-        def advance(arrays: list[Array], s: Array, x0: Array, v0: Array, x1: Array, v1: Array, h: Array) -> Array:
-            law, rig = numbers.built(arrays).law, numbers.built(arrays).rig
-            assert rig is not None
-            return law.advance(x0 - rig.stroke_offset, v0, x1 - rig.stroke_offset, v1, s, h)
-
-        states, of_states = [f"s[{i}]" for i in range(m)], [f"ds[{i}][k]" for i in range(m)]
-        signatures = {
-            "begin": Signature("begin", _ARGUMENTS["begin"], states, of_states),
-            "force": Signature("force", _ARGUMENTS["force"], ["*F"], ["dF[k]"]),
-            "advance": Signature("advance", _ARGUMENTS["advance"], states, of_states),
-        }
-        rest = {"force": list(map(symbols, "xv")), "advance": list(map(symbols, ("x0", "v0", "x1", "v1", "h")))}
-        moves = {name: [symbols(f"D{each.names[()]}") for each in some] for name, some in rest.items() if delay.size}
-        if delay.size:
-            moves["advance"][-1] = Symbols(np.array(Constant("0.0", "float64"), object))  # the step stays
-        each = {"begin": (lambda arrays, s: numbers.built(arrays).law.initial_state(), 0)}
-        each |= {"force": (force, m), "advance": (advance, m)}
-        if self.conditions:
-            names = [f"m[{i}]" for i in range(self.conditions)], [f"dm[{i}][k]" for i in range(self.conditions)]
-            signatures["margins"] = Signature("margins", _ARGUMENTS["margins"], *names)
-            each["margins"] = (lambda arrays, s: margins(numbers.built(arrays)), 0)
+        places = np.concatenate([ends[:0], *(np.arange(ends[i], ends[i + 1]) for i in free)])
+        delay = np.flatnonzero(places == self._machine.delay)
         rows = np.eye(max(self.slopes, 1), self.lanes, dtype=int)
-        head: dict[str, object] = {"slopes": self.slopes, "lanes": self.lanes, "states": m}
-        head["moves"] = _MOVES.format(*delay) if delay.size else ""
-        parts = [_HEAD.format(**head, rows=", ".join(f"{{{', '.join(map(str, row))}}}" for row in rows))]
-        parts += [
-            printed(signatures[name], function, states=count, rest=rest.get(name, ()), moves=moves.get(name, ()))
-            for name, (function, count) in each.items()
-        ]
-        text = "".join([*parts, _RECORD, _CONDITIONS * bool(self.conditions)])
+        head = {"slopes": self.slopes, "lanes": self.lanes, "states": self.states}
+        text = _HEAD.format(
+            **head,
+            rows=", ".join(f"{{{', '.join(map(str, row))}}}" for row in rows),
+            moves=_MOVES.format(*delay) if delay.size else "",
+        )
+        functions = _functions(numbers, self.states, self.conditions)
+        text += "".join(each.text(name, shapes, free, delay.size > 0) for name, each in functions.items())
+        text += _RECORD + _CONDITIONS * bool(self.conditions)
         self._record, self._conditions = library(text).record, getattr(library(text), "conditions", None)
         pointer, whole = ctypes.c_void_p, ctypes.c_int64
         self._record.argtypes = [pointer, whole, whole, *[pointer] * 8, ctypes.c_double, *[pointer] * 3, whole, pointer]

@@ -52,7 +52,7 @@ class RideBatch(AbstractResiduals):
             if of_record.starts:
                 motions = [jnp.concatenate([begin.position, begin.rate]) for begin in of_record.starts]
                 start = start + jnp.stack(motions)[number]
-            saved, _ = recorded(self.engine, system, heights, dt, start)
+            saved, _ = recorded(self.engine, system, heights, dt, start, 1, None)
             return jax.vmap(system.channels(self.channels))(
                 saved.motion, saved.port_force, saved.road, saved.road_rate
             ).T

@@ -38,7 +38,7 @@ Array([0.707107, 1.414214, 2.828427], dtype=float64)
 
 from typing import Any
 
-from jaxdamp.metrics._linear_system import StateSpace as StateSpace
+from jaxdamp.metrics._signals import StateSpace as StateSpace
 from jaxdamp.metrics.amplitude import (
     crest_factor,
     gaussian_exceedance,
@@ -72,14 +72,17 @@ from jaxdamp.metrics.dissipation import (
 )
 from jaxdamp.metrics.dose import (
     estimated_vibration_dose_value,
+    max_transient_value,
     motion_sickness_dose,
     motion_sickness_percentage,
+    running_rms,
+    third_octave_rms,
     vibration_dose_value,
 )
 from jaxdamp.metrics.fatigue import rainflow_cycles, spectral_damage, spectral_moments
-from jaxdamp.metrics.metric import Metric
-from jaxdamp.metrics.names import (
+from jaxdamp.metrics.metric import (
     RENAMED,
+    Metric,
     MetricValues as MetricValues,
     current_name as current_name,
     current_names as current_names,
@@ -89,10 +92,8 @@ from jaxdamp.metrics.roughness_index import (
     international_roughness_by_segment,
     international_roughness_index,
 )
-from jaxdamp.metrics.running import max_transient_value, running_rms
 from jaxdamp.metrics.spectrum import coherence, power_spectral_density, transmissibility
 from jaxdamp.metrics.statistics import STATISTICS, Gathered as Gathered, Reduction, Statistic, Term, percentile
-from jaxdamp.metrics.third_octaves import third_octave_rms
 from jaxdamp.metrics.tyre_load import (
     aggregate_force,
     aggregate_force_percentile,

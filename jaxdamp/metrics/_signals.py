@@ -1,12 +1,17 @@
-"""Checks of signals and a safe root, shared by the metrics."""
+"""What the metrics share: checks of signals, a safe root, the exact response of small linear systems."""
 
+from typing import NamedTuple
+
+import jax
 import jax.numpy as jnp
-from jax.typing import ArrayLike
-from jaxtyping import Array
+import numpy as np
+from jax.typing import ArrayLike, DTypeLike
+from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._forked import refuse_fork
-from jaxdamp._types import ScalarLike, Signal, SignalLike
+from jaxdamp._matrices import phi_functions
+from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
 
 
 def as_signal(argument: str, signal: SignalLike, *, least: int = 1) -> Signal:
@@ -41,3 +46,75 @@ def same_length(first: str, one: Signal, second: str, other: Signal) -> None:
 def check_interval(dt: ScalarLike | int) -> None:
     """Refuse a sampling interval that is not positive and finite."""
     _checks.positive("dt", dt, "It is the sampling interval in s.")
+
+
+class StateSpace(NamedTuple):
+    """A linear system with one input and one output: x' = A x + B u, y = C x + D u; time in seconds.
+
+    Attributes:
+        state_matrix: A [1/s], shape (n, n).
+        input_vector: B, shape (n,).
+        output_vector: C, shape (n,).
+        feed_through: D.
+    """
+
+    state_matrix: Float[Array, "n n"] | Float[np.ndarray, "n n"]
+    input_vector: Float[Array, " n"] | Float[np.ndarray, " n"]
+    output_vector: Float[Array, " n"] | Float[np.ndarray, " n"]
+    feed_through: ScalarLike
+
+
+_LAG = StateSpace(-np.ones((1, 1)), np.ones(1), np.ones(1), 0.0)
+
+
+def respond_as_lag(signal: Signal, dt: ScalarLike, time_constant: ScalarLike, start: Scalar | None = None) -> Signal:
+    """The solution of tau y' = u - y at every sample, from `start` (zero), exact as `respond_exactly`."""
+    return respond_exactly(_LAG, signal, quotient(dt, time_constant, signal.dtype), start)
+
+
+def quotient(above: ScalarLike, below: ScalarLike, dtype: DTypeLike) -> ScalarLike:
+    """The quotient of two numbers, known if both are."""
+    one, other = _checks.concrete(above), _checks.concrete(below)
+    if one is not None and other is not None:
+        return float(one) / float(other)
+    return jnp.asarray(above, dtype) / jnp.asarray(below, dtype)
+
+
+def respond_exactly(system: StateSpace, signal: Signal, dt: ScalarLike, start: Scalar | None = None) -> Signal:
+    """The output at every sample, exact for an input that runs straight from sample to sample (first-order hold).
+
+    The system is a constant (NumPy); it starts at rest, or with every state at `start`. One exponential of the
+    augmented matrix gives x₁ = Φ x₀ + H₀ u₀ + H₁ (u₁ − u₀); it is taken by SciPy in double precision where `dt` is
+    known and by JAX where it is traced.
+    """
+    n = system.input_vector.size
+    growth, shift = np.zeros((n + 2, n + 2)), np.zeros((n + 2, n + 2))
+    growth[:n, :n], growth[:n, n], shift[n, n + 1] = system.state_matrix, system.input_vector, 1.0
+    known = _checks.concrete(dt)
+    if known is None:
+        step = jnp.asarray(dt, signal.dtype)
+        matrix = phi_functions(jnp.asarray(growth, signal.dtype) * step + jnp.asarray(shift, signal.dtype))[0]
+    else:
+        from scipy.linalg import expm
+
+        matrix = jnp.asarray(expm(growth * float(known) + shift), signal.dtype)
+    output = jnp.asarray(system.output_vector, signal.dtype)
+    rest = np.zeros(n, signal.dtype) if start is None else jnp.full(n, start, signal.dtype)
+    return _run(matrix, output, jnp.asarray(system.feed_through, signal.dtype), signal, rest)
+
+
+@jax.jit
+def _run(
+    matrix: Float[Array, "n2 n2"], output: Float[Array, " n"], feed_through: Scalar, signal: Signal,
+    start: Float[Array, " n"],
+) -> Signal:  # fmt: skip
+    n = output.size
+    phi, held, ramp = matrix[:n, :n], matrix[:n, n], matrix[:n, n + 1]
+    drive = signal[:-1, None] * held[None, :] + jnp.diff(signal)[:, None] * ramp[None, :]
+
+    def step(state: Array, push: Array) -> tuple[Array, Array]:
+        state = phi @ state + push
+        return state, state
+
+    _, states = jax.lax.scan(step, start, drive)
+    return jnp.concatenate([start[None, :], states]) @ output + feed_through * signal

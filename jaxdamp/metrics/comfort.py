@@ -11,8 +11,7 @@ from jaxdamp._limits import root
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
 from jaxdamp.metrics._signals import as_numbers
 from jaxdamp.metrics.amplitude import crest_factor, rms
-from jaxdamp.metrics.dose import vibration_dose_value
-from jaxdamp.metrics.running import max_transient_value
+from jaxdamp.metrics.dose import max_transient_value, vibration_dose_value
 from jaxdamp.metrics.weighted import as_weighted, weighted_rms
 
 

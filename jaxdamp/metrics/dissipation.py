@@ -7,8 +7,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike, VectorLike
-from jaxdamp.metrics._linear_system import quotient, respond_as_lag
-from jaxdamp.metrics._signals import as_numbers, as_signal, check_interval, same_length
+from jaxdamp.metrics._signals import as_numbers, as_signal, check_interval, quotient, respond_as_lag, same_length
 
 
 def _trapezoid(signal: Signal) -> Scalar:

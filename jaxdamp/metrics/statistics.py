@@ -17,7 +17,7 @@ from jaxdamp import _checks
 from jaxdamp._limits import at_least, at_most, largest, root
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Scalar, ScalarLike, Signal
-from jaxdamp.metrics.running import max_transient_value
+from jaxdamp.metrics.dose import max_transient_value
 
 
 Gathered: TypeAlias = tuple[Scalar, ...]  # the terms of a statistic so far

@@ -12,8 +12,7 @@ from jaxtyping import Array, ArrayLike, Complex, Float
 from jaxdamp import _checks
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
-from jaxdamp.metrics._linear_system import StateSpace, respond_exactly
-from jaxdamp.metrics._signals import as_numbers, as_signal, check_interval
+from jaxdamp.metrics._signals import StateSpace, as_numbers, as_signal, check_interval, respond_exactly
 from jaxdamp.metrics.amplitude import rms
 
 

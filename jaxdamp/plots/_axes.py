@@ -21,12 +21,8 @@ _SLACK = 0.35  # inch, by which a title or label may be longer than its axes
 def label_axis(axes: Axes, name: Literal["x", "y"], label: str, *, turns: bool = False, times: float = 1.0) -> None:
     """The label of one axis, and ticks in the unit and the sign that are shown, by the unit in the label.
 
-    Arguments:
-        axes: with the axis.
-        name: of the axis.
-        label: with its unit in brackets.
-        turns: whether its sign is that of the direction, also if the label does not say so.
-        times: the numbers drawn, times this, are in the unit of the label.
+    `times` brings the numbers drawn to the unit of the label; with `turns` the sign is that of the direction, also if
+    the label does not say so.
     """
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
@@ -74,12 +70,7 @@ def _longest(text: "matplotlib.text.Text", axes: Axes) -> float:
 
 
 def few_ticks(axes: Axes, most: int) -> None:
-    """At most so many ticks along the abscissa, and no more than its labels have room for; in the unit that is shown.
-
-    Arguments:
-        axes: of any width.
-        most: ticks.
-    """
+    """At most so many ticks along the abscissa, and no more than its labels have room for, in the unit shown."""
     from matplotlib.ticker import MaxNLocator
 
     before = axes.xaxis.get_major_locator()

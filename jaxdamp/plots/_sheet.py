@@ -37,13 +37,7 @@ def lettering() -> Iterator[None]:
 def head(axes: Axes, name: str, sentence: str, facts: str, *, answer: str = "", colour: str = _style.BLACK) -> None:
     """The head of a sheet: its name, the sentence that says what to do, and what was measured or driven.
 
-    Arguments:
-        axes: over the width of the page.
-        name: of the damper or vehicle.
-        sentence: the finding.
-        facts: in small print below.
-        answer: in a few words before the sentence: build it or not.
-        colour: of the answer, or of the sentence without one: good or bad.
+    In `colour` is the answer, or the sentence where there is none.
     """
     blank(axes)
     axes.text(0.0, 1.0, f"{_style.said(name)}   ·   {_style.said(facts)}"[:130], color=_style.GREY, **_TEXT)
@@ -77,14 +71,7 @@ def table(
 ) -> None:
     """A table of text: the first column to the left, the others to the right at their ends.
 
-    Arguments:
-        axes: to write in.
-        title: above.
-        headings: of the columns.
-        rows: cells of each.
-        ends: right end of each column but the first, as a share of the width.
-        step: height of a row, as a share of the height.
-        colours: of the rows; black if left out.
+    `ends` (of each column but the first) and `step` (of rows) are shares of the width and the height.
     """
     blank(axes)
     axes.text(0.0, 1.0, title, **_TEXT)
@@ -97,16 +84,7 @@ def table(
 
 
 def remarks(axes: Axes, title: str, sentences: Sequence[str], *, width: int, none: str = "", most: int = 3) -> None:
-    """At most so many sentences under a title; the others are counted.
-
-    Arguments:
-        axes: to write in.
-        title: above.
-        sentences: the most important first.
-        width: letters in a line.
-        none: what is written where there are none.
-        most: sentences to write.
-    """
+    """At most so many sentences under a title; the others are counted."""
     blank(axes)
     shown = [textwrap.shorten(_style.said(display().words(s)), 3 * width, placeholder=" …") for s in sentences[:most]]
     lines = [line for s in shown or [none] for line in textwrap.wrap(s, width, subsequent_indent="   ")]

@@ -37,7 +37,7 @@ DASHES = ("-", "--", "-.", ":")
 BLACK = "#222222"
 GREY = "#6B6B6B"
 SHADE = "#F5EEDF"  # behind what is extrapolated
-GOOD, DOUBT, BAD = "#00755A", "#9A5B00", "#B00020"  # of a verdict; what is beyond a limit is BAD
+GOOD, BAD = "#00755A", "#B00020"  # of a verdict; what is beyond a limit is BAD
 # What a line means, the same in every picture, on every page and in notebooks.
 MEASURED: Look = {"color": GREY, "linestyle": "-"}
 BEFORE: Look = {"color": BLACK, "linestyle": "--", "linewidth": 1.3, "zorder": 2.5}
@@ -48,7 +48,6 @@ PRESENT: Look = {"marker": "o", "color": BLACK, "markersize": 8.0, "markeredgeco
 BEST: Look = {"marker": "*", "color": COLOURS[0], "markersize": 14.0}
 LIMIT: Look = {"color": BAD, "linestyle": "--", "linewidth": 1.2}
 REBOUND, COMPRESSION = COLOURS[0], COLOURS[1]  # where both are on one axis
-FRONT, REAR = "-", "-."
 ROLES: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     {
         "measured": MEASURED,
@@ -99,10 +98,7 @@ def line_style(index: int) -> Look:
 def design_styles(names: Sequence[str], before: str | None = None, reference: str | None = None) -> dict[str, Look]:
     """How to draw designs by name: the first is blue, the next have other colours; of many, other dashes too.
 
-    Arguments:
-        names: of the designs, the most important first.
-        before: name of the one that the others are compared with: black and dashed.
-        reference: name of the truth or of a measurement: broad and grey beneath the others.
+    `before`, to compare with, is black and dashed; `reference`, such as a measurement, is broad and grey beneath them.
     """
     others = [name for name in names if name not in (before, reference)]
     styles = {name: {"linewidth": 1.4, **line_style(i), **(AFTER if i == 0 else {})} for i, name in enumerate(others)}
@@ -249,13 +245,7 @@ def _in_words(handles: Sequence[Any]) -> None:
 def by_name(argument: str, given: object, kind: type, words: str, remedy: str, alone: str = "") -> Look:
     """One object to draw, or several by name, as a dictionary; `alone` names a single one.
 
-    Arguments:
-        argument: its name in messages.
-        given: an object, or objects by name.
-        kind: their class.
-        words: the class in words, such as "a damper law".
-        remedy: what to write.
-        alone: the name of a single object.
+    `words` are those of the class, such as "a damper law".
 
     Raises:
         ValueError: none, or objects of another kind.

@@ -15,7 +15,7 @@ from jaxdamp.bench import BenchRun, Evaluation, LimitCheck, evaluate, last_stead
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Band, Comparison, FitResult, Rung
 from jaxdamp.plots import _sheet, _style, fitted_range
-from jaxdamp.plots.evaluation import both_directions, gas_and_friction_words
+from jaxdamp.plots.evaluation import both_directions, gas_and_friction_words, limit_bars
 from jaxdamp.plots.loops import spread
 from jaxdamp.rig import quasi_static
 
@@ -220,12 +220,9 @@ def _curve(axes: Axes, law: AbstractDamper, reach: float, label: str, style: Map
 
 def _tolerances(axes: Axes, limits: LimitCheck, static: float) -> None:
     """Bars from the least to the largest force at stated velocities, red where the measured force is outside."""
-    for limit, measured in limits.results:
-        if limit.velocity is not None and measured is not None and measured.unit == "N":
-            at = _MM * (limit.velocity if limit.quantity.startswith("rebound") else -limit.velocity)
-            ends = [measured.value if end is None else end for end in (limit.minimum, limit.maximum)]
-            colour = _style.GOOD if limit.kept_by(measured.value) else _style.BAD
-            axes.plot([at, at], [end - static for end in ends], color=colour, linewidth=6.0, alpha=0.6, zorder=1.0)
+    for at, ends, passed in limit_bars(limits):
+        colour, place = _style.GOOD if passed else _style.BAD, [_MM * at] * 2
+        axes.plot(place, [end - static for end in ends], color=colour, linewidth=6.0, alpha=0.6, zorder=1.0)
 
 
 def _forces(axes: Axes, damper: _Damper) -> None:

@@ -83,13 +83,7 @@ def ratios(
 ) -> float:
     """Draw the damping ratio of the body over velocities [m/s], with a gap at rest; the height that it needs.
 
-    Arguments:
-        axes: to draw in.
-        law: dotted where it is extrapolated.
-        critical: of its body and wheel.
-        points: increasing velocities.
-        force: settled, at these.
-        style: of the line.
+    `force` is settled at the velocities `points` [m/s], which increase.
     """
     slow = np.abs(points) < AT_REST * np.abs(points).max()
     secant = (force - np.interp(0.0, points, force)) / np.where(slow, np.nan, points)

@@ -1,6 +1,6 @@
 """Records without a law: as they are, mean loops, forces over velocity with limits and a baseline, gas and friction."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -237,20 +237,23 @@ def _branch(evaluation: Evaluation, setting: str, side: str) -> tuple[np.ndarray
     return velocity, force
 
 
+def limit_bars(limits: LimitCheck) -> Iterator[tuple[float, list[float], bool]]:
+    """Velocity [m/s], least and largest force, and whether they are kept, of limits at stated velocities."""
+    for limit, measured in limits.results:
+        if limit.velocity is not None and measured is not None and measured.unit == "N":
+            ends = [measured.value if end is None else end for end in (limit.minimum, limit.maximum)]
+            side = 1.0 if limit.quantity.startswith("rebound") else -1.0
+            yield side * limit.velocity, ends, limit.kept_by(measured.value)
+
+
 def _draw_limits(axes: Axes, limits: LimitCheck) -> list:
     """Bars from the least to the largest force at stated velocities; one-sided limits end at the measured value."""
     from matplotlib.lines import Line2D
 
     colours = {True: _style.GOOD, False: _style.BAD}
     seen = set()
-    for limit, measured in limits.results:
-        if limit.velocity is None or measured is None or measured.unit != "N":
-            continue
-        passed = limit.kept_by(measured.value)
-        low = measured.value if limit.minimum is None else limit.minimum
-        high = measured.value if limit.maximum is None else limit.maximum
-        at = limit.velocity if limit.quantity.startswith("rebound") else -limit.velocity
-        axes.plot([at, at], [low, high], color=colours[passed], linewidth=7.0, alpha=0.45, solid_capstyle="butt")
+    for at, ends, passed in limit_bars(limits):
+        axes.plot([at, at], ends, color=colours[passed], linewidth=7.0, alpha=0.45, solid_capstyle="butt")
         seen.add(passed)
     words = {True: "limits, kept", False: "limits, not kept"}
     return [

@@ -1,4 +1,4 @@
-"""Natural modes; over frequency, vehicles on a sine of their road, laws on the test machine, and what is felt."""
+"""Over frequency: modes, vehicles on a sine of their road, laws on the test machine, what is felt, and roughness."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,8 +8,10 @@ import numpy as np
 from jaxdamp import metrics
 from jaxdamp._steady_cycles import AbstractSteadyCycles
 from jaxdamp._types import Axes, Figure
+from jaxdamp.metrics import RoughnessBySegment
 from jaxdamp.plots import _style
 from jaxdamp.rig import DynamicStiffness
+from jaxdamp.roads import RoughnessAssessment, class_limits
 from jaxdamp.simulation import HarmonicResponse
 from jaxdamp.vehicles import ChannelKind, Modes
 
@@ -114,12 +116,7 @@ def third_octaves(
 ) -> None:
     """Weighted RMS in third octaves of spectra: the last one filled, the others as outlines.
 
-    Arguments:
-        axes: to draw in.
-        sides: label, look and spectrum (frequencies, densities) of each.
-        weighting: of ISO 2631-1.
-        unit: of the signal.
-        name: of the signal, in words.
+    Each side is a label, a look and a spectrum (frequencies, densities).
     """
     found = [np.stack([np.asarray(a) for a in metrics.third_octave_rms(*each, weighting)]) for *_, each in sides]
     known = np.all([np.isfinite(rms) for _, rms in found], axis=0)
@@ -144,11 +141,7 @@ def welch(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies and densities of a record, as `metrics.power_spectral_density`, which is compiled for each length.
 
-    Arguments:
-        values: the record.
-        dt: its interval [s].
-        size: samples of a segment; the whole record if left out.
-        window: of SciPy.
+    `size` is that of a segment, the whole record if left out.
     """
     from scipy import signal
 
@@ -158,3 +151,50 @@ def welch(
 def whole_spectrum(values: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
     """The density of a whole record as one segment."""
     return welch(values, dt, window="boxcar")
+
+
+def roughness_by_segment(roughness: RoughnessBySegment) -> Figure:
+    """The international roughness index of each segment over the distance, and that of the whole profile.
+
+    Arguments:
+        roughness: of `metrics.roughness_by_segment`.
+    """
+    figure = _style.new_figure(8.0, 3.5)
+    axes = figure.subplots()
+    values, whole = 1e3 * np.asarray(roughness.segments), 1e3 * float(roughness.whole)
+    bars = axes.bar(roughness.starts, values, roughness.lengths, align="edge", edgecolor="white", label="segment")
+    line = axes.axhline(whole, color=_style.GREY, linestyle="--", label=f"whole profile, {whole:.3g} m/km")
+    title = "Roughness by segment"
+    if roughness.is_partial:
+        title += f" (the last one {roughness.lengths[-1]:.4g} m)"
+    _style.dress(axes, "distance [m]", "IRI [m/km]", title)
+    _style.legend_beside(figure, [bars, line])
+    return figure
+
+
+def roughness_spectrum(assessment: RoughnessAssessment) -> Figure:
+    """The displacement spectrum of a road over the spatial frequency, its straight line, and the classes of ISO 8608.
+
+    Arguments:
+        assessment: of `roads.assess_roughness`.
+    """
+    figure = _style.new_figure(8.5, 5.0)
+    axes = figure.subplots()
+    n, density = assessment.spatial_frequency, assessment.displacement_psd
+    ends = np.array([n[0], n[-1]])
+    line = assessment.roughness_psd * (ends / 0.1) ** -assessment.waviness
+    handles = axes.loglog(n, density, "o-", color=_style.COLOURS[0], markersize=3.5, label="mean of each band")
+    label = f"straight line, waviness {assessment.waviness:.2f}"
+    handles += axes.loglog(ends, line, color=_style.COLOURS[1], label=label)
+    low, high = axes.get_ylim()
+    for name in "ABCDEFG":
+        edge = class_limits(name)[1] * (ends / 0.1) ** -2.0
+        if edge[0] > low and edge[1] < high:
+            axes.loglog(ends, edge, color="0.8", linewidth=0.9, zorder=0)
+            at, side = (1, "left") if edge[1] > low else (0, "right")
+            shift = (3 if at else -3, -3)
+            axes.annotate(name, (ends[at], edge[at]), shift, textcoords="offset points", color="0.5", ha=side)
+    axes.set_ylim(low, high)
+    _style.dress(axes, "spatial frequency [cycle/m]", "displacement PSD [m³]", f"Road of class {assessment.road_class}")
+    _style.legend_beside(figure, handles, "grey: upper ends of the classes")
+    return figure

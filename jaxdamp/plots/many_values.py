@@ -1,12 +1,19 @@
-"""Numbers with their spread: one law fitted to many dampers, posteriors, targets, a tuning on other roads."""
+"""Numbers with their spread: many dampers, control charts, posteriors, targets, other roads, points of a sweep."""
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._tables import typeset_unit
 from jaxdamp._types import Axes, Figure
-from jaxdamp.identify import ManyFits, Posterior, TargetFit
+from jaxdamp.identify import ControlCharts, ManyFits, Posterior, TargetFit
 from jaxdamp.plots import _style
 from jaxdamp.tune import DamperComparison, Rescore
+
+
+if TYPE_CHECKING:
+    from jaxdamp.sweeps import SweepSummary
 
 
 _COLUMNS = 3  # of panels
@@ -100,10 +107,10 @@ def rescore(result: Rescore) -> Figure:
     return figure
 
 
-def _panels(count: int) -> tuple[Figure, list[Axes]]:
-    """So many panels, three in a row."""
+def _panels(count: int, head: float = 0.6) -> tuple[Figure, list[Axes]]:
+    """So many panels, three in a row, below a head of this height [inch]."""
     rows = -(-count // _COLUMNS)
-    figure = _style.new_figure(12.0, 0.6 + 2.8 * rows)
+    figure = _style.new_figure(12.0, head + 2.8 * rows)
     grid = figure.add_gridspec(rows, _COLUMNS)
     return figure, [figure.add_subplot(grid[i // _COLUMNS, i % _COLUMNS]) for i in range(count)]
 
@@ -152,3 +159,93 @@ def damper_comparison(comparison: DamperComparison) -> Figure:
 def _finite(errors: np.ndarray) -> np.ndarray:
     """Errors to draw: none where they are unknown, which the notes below say."""
     return np.where(np.isfinite(errors), errors, 0.0)
+
+
+MOST = 8  # quantities that are drawn
+
+
+def control_charts(result: ControlCharts) -> Figure:
+    """Each quantity in each chart: points over the dampers, the limits, and signals in another colour.
+
+    The baseline is shaded. Individuals are in the unit of the quantity, the others in standard deviations.
+
+    Arguments:
+        result: of `identify.control_charts`.
+    """
+    remedy = "The call is `control_charts(charts)` with the result of `identify.control_charts`."
+    _checks.instance("result", result, ControlCharts, "be control charts", remedy)
+    drawn = list(result.quantities.items())[:MOST]
+    figure = _style.new_figure(4.2 * len(result.charts), 0.9 + 2.4 * len(drawn))
+    grid, place = figure.add_gridspec(len(drawn), len(result.charts)), np.arange(len(result.names)) + 1
+    for row, (name, unit) in enumerate(drawn):
+        for column, chart in enumerate(result.charts):
+            axes = figure.add_subplot(grid[row, column])
+            scale, centre, label = 1.0, 0.0, "[standard deviations]"
+            if chart.name == "individuals":
+                scale, centre = float(result.deviation[row]), float(result.centre[row])
+                label = f"[{typeset_unit(unit, '–')}]"
+            signs = result.signals[name][column]
+            axes.axvspan(result.baseline[0] + 0.5, result.baseline[-1] + 1.5, color=_style.SHADE, zorder=0)
+            for level, style in ((-chart.limit, "--"), (0.0, "-"), (chart.limit, "--")):
+                axes.axhline(centre + scale * level, color=_style.BLACK, linewidth=0.9, linestyle=style)
+            for values in {id(v): v for v in chart.statistics(result.scores[:, row])}.values():
+                axes.plot(place, centre + scale * values, ".-", color=_style.COLOURS[0], linewidth=0.6, markersize=3)
+                out = (signs != 0) & (np.abs(values) > chart.limit)
+                axes.plot(place[out], centre + scale * values[out], "o", color=_style.COLOURS[1], markersize=4)
+            _style.dress(axes, "damper" if row == len(drawn) - 1 else "", label, f"{name}, {chart.name}")
+    figure.suptitle(f"{len(result.names)} dampers, limits from {result.baseline.size} of them (shaded)")
+    more = len(result.quantities) - len(drawn)
+    _style.note_below(figure, [f"{more} further quantities are in the tables."] if more else [])
+    return figure
+
+
+def sweep_summary(result: "SweepSummary") -> Figure:
+    """A histogram of each result that has one, with its mean and standard deviation; else its mean and range.
+
+    The Pareto set is drawn over its first two results. Points outside the bins are counted in the title.
+
+    Arguments:
+        result: of `jaxdamp.sweep(..., summary=...)`.
+    """
+    from jaxdamp.sweeps import SweepSummary  # with xarray and pandas, which other pictures do without
+
+    remedy = "The call is `sweep_summary(found)` with the result of `jaxdamp.sweep(..., summary=sweeps.Summary())`."
+    _checks.instance("result", result, SweepSummary, "be the summary of a sweep", remedy)
+    names = [str(name) for name in result.statistics.data_vars]
+    count = len(names) + (result.pareto is not None)
+    figure, panels = _panels(count, head=0.9)
+    for axes, name in zip(panels, names, strict=False):
+        _spread(axes, result, name)
+    if result.pareto is not None:
+        x, y = result.pareto.attrs["objectives"][:2]
+        first, second = (str(name) for name in (x, y))
+        axes, units = panels[-1], [typeset_unit(result.pareto[name].attrs.get("units", ""), "–") for name in (x, y)]
+        axes.plot(result.pareto[x], result.pareto[y], ".", color=_style.COLOURS[1])
+        title = f"Pareto set of {result.pareto.sizes['point']} points"
+        _style.dress(
+            axes, f"{_style.metric_words(first)} [{units[0]}]", f"{_style.metric_words(second)} [{units[1]}]", title
+        )
+    figure.suptitle(result.summary)
+    return figure
+
+
+def _spread(axes: Axes, result: "SweepSummary", name: str) -> None:
+    """A histogram with mean and standard deviation, or these alone between the ends."""
+    _, mean, deviation, low, high = result.statistics[name].values.tolist()
+    title = _style.metric_words(name)
+    if name in result.histograms:
+        counts = result.histograms[name]
+        lower, upper = counts["lower"].values[1:-1], counts["upper"].values[1:-1]
+        axes.bar(lower, counts.values[1:-1], upper - lower, align="edge", color=_style.COLOURS[0], alpha=0.6)
+        outside = int(counts.values[0] + counts.values[-1])
+        title += f", {outside} points outside" if outside else ""
+        label = "points"
+    else:
+        axes.plot([low, high], [0.0, 0.0], "|-", color=_style.COLOURS[0], markersize=14)
+        axes.set_yticks([])
+        label = ""
+    if np.isfinite(mean):
+        axes.axvspan(mean - deviation, mean + deviation, color=_style.SHADE, zorder=0)
+        axes.axvline(mean, color=_style.BLACK, linewidth=1.2)
+    unit = typeset_unit(result.statistics[name].attrs.get("units", ""), "–")
+    _style.dress(axes, f"mean, standard deviation{'' if label else ', range'} [{unit}]", label, title)

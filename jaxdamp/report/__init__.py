@@ -10,16 +10,19 @@
 
 from jaxdamp._guesses import answer_guesses
 from jaxdamp._tables import Column as Column, Table
-from jaxdamp.report.attempts import Attempts as Attempts
 from jaxdamp.report.benches import (
     add_evaluation as add_evaluation,
+    add_records as add_records,
     baseline_table as baseline_table,
     bench_report,
     bench_verdict as bench_verdict,
+    fitted_range_table as fitted_range_table,
     law_evaluation as law_evaluation,
+    range_use_table as range_use_table,
+    records_table as records_table,
     table_report as table_report,
 )
-from jaxdamp.report.chains import chain_report
+from jaxdamp.report.chains import chain_report, result_report
 from jaxdamp.report.fits import (
     add_fits as add_fits,
     add_other_fits as add_other_fits,
@@ -29,14 +32,7 @@ from jaxdamp.report.fits import (
     fitted_velocities as fitted_velocities,
     parameters_of as parameters_of,
 )
-from jaxdamp.report.page import Report
-from jaxdamp.report.records import (
-    add_records as add_records,
-    fitted_range_table as fitted_range_table,
-    range_use_table as range_use_table,
-    records_table as records_table,
-)
-from jaxdamp.report.results import result_report
+from jaxdamp.report.page import Attempts as Attempts, Report
 from jaxdamp.report.rides import (
     add_rides as add_rides,
     axles_sentence as axles_sentence,

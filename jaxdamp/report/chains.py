@@ -1,20 +1,20 @@
-"""A page on the whole chain: records, laws, rides on the best law, a tuning."""
+"""A page on the whole chain, and on any result: records, laws, rides on the best law, a tuning."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from jaxdamp import plots
+from jaxdamp._results import AbstractResult
 from jaxdamp.bench import BenchRun, Evaluation, Preflight
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.identify import Comparison
-from jaxdamp.report.attempts import Attempts
-from jaxdamp.report.benches import add_evaluation, bench_verdict
-from jaxdamp.report.fits import add_fits, add_other_fits, fit_verdict
-from jaxdamp.report.page import Report
-from jaxdamp.report.records import add_records
-from jaxdamp.report.rides import add_rides, notes_of, ride_verdict
-from jaxdamp.report.tunings import add_tuning
+from jaxdamp.identify import Comparison, VehicleComparison, VehicleFit
+from jaxdamp.report.benches import add_evaluation, add_records, bench_report, bench_verdict
+from jaxdamp.report.fits import add_fits, add_other_fits, fit_report, fit_verdict
+from jaxdamp.report.page import Attempts, Report
+from jaxdamp.report.rides import add_rides, notes_of, ride_report, ride_verdict
+from jaxdamp.report.tunings import add_tuning, tuning_report
+from jaxdamp.report.vehicle_fits import vehicle_comparison_report, vehicle_fit_report
 from jaxdamp.simulation import Response
 from jaxdamp.tune import TuneResult
 
@@ -108,3 +108,45 @@ def _add_sheets(
     elif rides:
         road, ride = next(iter(rides.items()))
         report.sheet(lambda: plots.ride_sheet(ride, name=road), ride_verdict(ride)[-1], "ride_sheet")
+
+
+_PAGES: dict[type, Callable[..., Report]] = {
+    Comparison: fit_report,
+    Evaluation: bench_report,
+    Response: ride_report,
+    TuneResult: tuning_report,
+    VehicleComparison: vehicle_comparison_report,
+    VehicleFit: vehicle_fit_report,
+}
+
+
+def result_report(
+    result: AbstractResult, title: str = "", *, folder: Path | None = None, attempts: Attempts | None = None
+) -> Report:
+    """A page on a result, as `result.report(path)` writes it.
+
+    Arguments:
+        result: of a fit, a tuning or a study.
+        title: of the page; that of its kind if left out.
+        folder: where its pictures are written as files too.
+        attempts: parts that may fail by themselves.
+
+    >>> from jaxdamp import report, vehicles
+    >>> page = report.result_report(vehicles.modes(vehicles.presets.quarter_car_000()))
+    >>> "damping ratio" in page.to_html()
+    True
+    """
+    page_of = next((page for kind, page in _PAGES.items() if isinstance(result, kind)), None)
+    if page_of is not None:
+        named = {"title": title} if title else {}
+        return page_of(result, folder=folder, attempts=attempts, **named)
+    page = Report(title or result.table().title, folder, attempts)
+    page.verdict(result.summary)
+    if result.warnings:
+        page.heading("Warnings")
+        page.points(result.warnings)
+    page.heading("Results")
+    for table in result.tables().values():
+        page.table(table)
+    page.picture(result.plot, result.summary, "result.png")
+    return page

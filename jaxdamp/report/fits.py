@@ -11,11 +11,19 @@ from jaxdamp._tables import Table
 from jaxdamp._words import in_words
 from jaxdamp.bench import BenchRun, Preflight
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.identify import Band, Comparison, CrossValidation, FitResult, Rung, rounded, without_machine
+from jaxdamp.identify import (
+    Band,
+    Comparison,
+    CrossValidation,
+    FitResult,
+    Rung,
+    VehicleComparison,
+    rounded,
+    without_machine,
+)
 from jaxdamp.parameters import parameters
-from jaxdamp.report.attempts import Attempts
-from jaxdamp.report.page import Report
-from jaxdamp.report.records import add_records, fitted_range_table
+from jaxdamp.report.benches import add_records, fitted_range_table
+from jaxdamp.report.page import Attempts, Report
 
 
 def machine_sentences(result: FitResult) -> tuple[str, ...]:
@@ -191,8 +199,8 @@ def parameters_of(rung: Rung) -> Table:
     return rung.result.table(title=f"Parameters of {rung.name}")
 
 
-def failure_sentences(comparison: Comparison) -> list[str]:
-    """The laws without a fit, and why.
+def failure_sentences(comparison: Comparison | VehicleComparison) -> list[str]:
+    """The laws or vehicles without a fit, and why.
 
     Arguments:
         comparison: of `identify.compare`.

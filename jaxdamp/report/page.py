@@ -1,4 +1,4 @@
-"""A page of results: one self-contained HTML file."""
+"""A page of results: one self-contained HTML file, whose parts may fail by themselves."""
 
 import base64
 import datetime
@@ -6,8 +6,9 @@ import html
 import io
 import os
 import platform
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,34 @@ from jaxdamp._display import display
 from jaxdamp._tables import Table
 from jaxdamp._types import Figure
 from jaxdamp._words import first_upper, said
-from jaxdamp.report.attempts import Attempts
+
+
+class Attempts:
+    """Parts of the work that do not depend on one another.
+
+    Arguments:
+        check: called before each part; what it raises is raised, such as an interruption.
+        message: what an error says, in words.
+
+    Attributes:
+        troubles: the parts that failed, completely or partly, and why, in words.
+    """
+
+    def __init__(self, check: Callable[[], None] = lambda: None, message: Callable[[Exception], str] = str) -> None:
+        self.troubles: list[str] = []
+        self._check, self._message = check, message
+
+    @contextmanager
+    def part(self, what: str) -> Iterator[None]:
+        """One part: any error in it is noted and not raised, so that the other parts are not lost."""
+        self._check()
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", UserWarning)
+            try:
+                yield
+            except Exception as error:
+                self.troubles.append(f"{what} could not be made: {self._message(error) or type(error).__name__}")
+        self.troubles += [str(warning.message) for warning in caught if warning.category is UserWarning]
 
 
 PIXELS = 86  # of a page for an inch of a picture: the widest ones fill the page

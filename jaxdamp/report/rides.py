@@ -12,9 +12,8 @@ from jaxdamp._words import path_words
 from jaxdamp.dampers import AbstractDamper, law_name
 from jaxdamp.metrics import comfort_reaction
 from jaxdamp.parameters import parameters
-from jaxdamp.report.attempts import Attempts
-from jaxdamp.report.page import Report
-from jaxdamp.report.records import range_use_table
+from jaxdamp.report.benches import range_use_table
+from jaxdamp.report.page import Attempts, Report
 from jaxdamp.simulation import Response, comfort_table, far_outside, metrics_table
 
 

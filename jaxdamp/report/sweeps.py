@@ -9,8 +9,7 @@ from jaxdamp import plots
 from jaxdamp._tables import percent_change, typeset_unit
 from jaxdamp._types import DataArray, Dataset
 from jaxdamp._words import path_words
-from jaxdamp.report.attempts import Attempts
-from jaxdamp.report.page import Report
+from jaxdamp.report.page import Attempts, Report
 from jaxdamp.tune import limit_spans
 
 

@@ -10,8 +10,7 @@ import numpy as np
 from jaxdamp import _checks, plots
 from jaxdamp._tables import Compared, Table, comparison_table, percent_change
 from jaxdamp.parameters import get
-from jaxdamp.report.attempts import Attempts
-from jaxdamp.report.page import Report
+from jaxdamp.report.page import Attempts, Report
 from jaxdamp.simulation import Response, Ride
 from jaxdamp.tune import Rescore, TuneResult, damper_paths
 from jaxdamp.vehicles import AbstractVehicle
@@ -87,13 +86,7 @@ def add_tuning(
 
 
 def add_baseline(report: Report, result: TuneResult[Any], baseline: AbstractVehicle) -> None:
-    """The section of a page on a tuning beside another vehicle: ride metrics on the same road, and damper curves.
-
-    Arguments:
-        report: the page.
-        result: of `tune.minimise`.
-        baseline: the other vehicle, of the same class.
-    """
+    """The section of a page on a tuning beside another vehicle: ride metrics on the same road, and damper curves."""
     _checks.instance("baseline", baseline, type(result.start), f"be a {type(result.start).__name__} as the tuned one")
     report.heading("Beside the baseline")
     if result.drive is not None:

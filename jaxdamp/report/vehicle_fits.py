@@ -10,9 +10,9 @@ from jaxdamp._tables import Column, Table
 from jaxdamp.bench import RideRecord
 from jaxdamp.identify import VehicleComparison, VehicleFit, without_machine
 from jaxdamp.parameters import get
-from jaxdamp.report.attempts import Attempts
-from jaxdamp.report.page import Report
-from jaxdamp.report.records import records_table
+from jaxdamp.report.benches import records_table
+from jaxdamp.report.fits import failure_sentences
+from jaxdamp.report.page import Attempts, Report
 
 
 def vehicle_fit_report(
@@ -67,7 +67,7 @@ def vehicle_comparison_report(
     report.verdict(*comparison.verdict)
     report.heading("How good the vehicles are")
     report.table(comparison.table())
-    report.points([f"{failure.name} could not be fitted. {failure.reason}" for failure in comparison.failed])
+    report.points(failure_sentences(comparison))
     report.picture(comparison.plot, "Errors of the vehicles", "ladder.png")
     report.table(best.scores_table())
     report.heading(f"The recommended vehicle: {best.name}")

@@ -36,17 +36,20 @@ A speed hump, then a rough surface, at 10 m/s:
 
 from jaxdamp._guesses import answer_guesses
 from jaxdamp.roads._composed import joined, superposed
-from jaxdamp.roads.assessment import RoughnessAssessment as RoughnessAssessment, assess_roughness
+from jaxdamp.roads.assessment import (
+    RoughnessAssessment as RoughnessAssessment,
+    assess_roughness,
+    class_limits as class_limits,
+    road_class,
+)
 from jaxdamp.roads.axles import delayed, in_phase
 from jaxdamp.roads.base import AbstractRoad, Columns as Columns
 from jaxdamp.roads.bump import cosine_bump, pothole, step
 from jaxdamp.roads.contact import contact_patch, rolling_disc
 from jaxdamp.roads.cornered_bump import half_sine_bump, trapezoid_bump, triangular_bump
-from jaxdamp.roads.crg import read_crg
 from jaxdamp.roads.harmonic import sine, sweep_sine, wave_course
-from jaxdamp.roads.iso_classes import class_limits as class_limits, road_class
 from jaxdamp.roads.iso_roughness import iso8608
-from jaxdamp.roads.profile import from_profile, read_profile
+from jaxdamp.roads.profile import from_profile, read_crg, read_profile
 from jaxdamp.roads.random_roads import WhiteRoad as WhiteRoad, band_limited, iso8608_filtered, white
 from jaxdamp.roads.tracks import coherency, two_track
 

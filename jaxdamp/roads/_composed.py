@@ -21,44 +21,8 @@ class AbstractOnOneRoad(AbstractRoad):
     road: eqx.AbstractVar[AbstractRoad]
 
     @property
-    def wheels(self) -> int:
-        """That of the road."""
-        return self.road.wheels
-
-    @property
-    def columns(self) -> Columns:
-        """That of the road."""
-        return self.road.columns
-
-    @property
-    def grid(self) -> float | None:
-        """That of the road [s]."""
-        return self.road.grid
-
-    @property
-    def duration(self) -> float | None:
-        """That of the road [s]."""
-        return self.road.duration
-
-    @property
-    def longest_run(self) -> float | None:
-        """That of the road [s]."""
-        return self.road.longest_run
-
-    @property
-    def shortest_event(self) -> float | None:
-        """That of the road [s]."""
-        return self.road.shortest_event
-
-    @property
-    def span(self) -> tuple[Scalar | float, Scalar | float]:
-        """That of the road [s]."""
-        return self.road.span
-
-    def reseeded(self, seed: int) -> AbstractRoad | None:
-        """The same view of the reseeded road."""
-        other = self.road.reseeded(seed)
-        return None if other is None else eqx.tree_at(lambda own: own.road, self, other)
+    def _parts(self) -> tuple[AbstractRoad, ...]:
+        return (self.road,)
 
 
 class AbstractOnSeveralRoads(AbstractRoad):
@@ -67,59 +31,8 @@ class AbstractOnSeveralRoads(AbstractRoad):
     roads: eqx.AbstractVar[tuple[AbstractRoad, ...]]
 
     @property
-    def speed(self) -> Scalar | None:
-        """The speed [m/s] that the roads have in common."""
-        return common_speed(self.roads)
-
-    @property
-    def grid(self) -> float | None:
-        """The finest of the grids [s]."""
-        return least([road.grid for road in self.roads])
-
-    @property
-    def duration(self) -> float | None:
-        """The shortest of the durations [s]."""
-        return least([road.duration for road in self.roads])
-
-    @property
-    def longest_run(self) -> float | None:
-        """The shortest of those of the roads [s]."""
-        return least([road.longest_run for road in self.roads])
-
-    @property
-    def shortest_event(self) -> float | None:
-        """The shortest of those of the roads [s]."""
-        return least([road.shortest_event for road in self.roads])
-
-    @property
-    def span(self) -> tuple[Scalar, Scalar]:
-        """The times [s] between which all the roads have a height."""
-        first, last = zip(*(road.span for road in self.roads), strict=True)
-        begin = jnp.max(jnp.stack([jnp.asarray(time, float) for time in first]))
-        return begin, jnp.min(jnp.stack([jnp.asarray(time, float) for time in last]))
-
-    def reseeded(self, seed: int) -> AbstractRoad | None:
-        """The same combination of the reseeded roads; tracks of one surface stay as coherent as they are."""
-        others = [road.reseeded(seed) for road in self.roads]
-        if all(other is None for other in others):
-            return None
-        chosen = tuple(road if other is None else other for road, other in zip(self.roads, others, strict=True))
-        return eqx.tree_at(lambda own: own.roads, self, chosen)
-
-
-def least(times: Sequence[float | None]) -> float | None:
-    """The least of the times that are known [s]."""
-    known = [time for time in times if time is not None]
-    return min(known) if known else None
-
-
-def common_speed(roads: Sequence[AbstractRoad]) -> Scalar | None:
-    """The speed [m/s] of those roads that have one; `None` if none has, or if they were made for different speeds."""
-    speeds = [road.speed for road in roads if road.speed is not None]
-    known = [value for value in map(_checks.concrete, speeds) if value is not None]
-    if not speeds or any(not np.allclose(value, known[0], rtol=1e-6, atol=0.0) for value in known):
-        return None
-    return speeds[0]
+    def _parts(self) -> tuple[AbstractRoad, ...]:
+        return self.roads
 
 
 def agreed_speed(road: AbstractRoad, speed: ScalarLike | int | None, wanted_with: str) -> Scalar:
@@ -166,16 +79,6 @@ class Superposed(AbstractOnSeveralRoads):
             total = total + road.height(time)
         return total
 
-    @property
-    def wheels(self) -> int:
-        """That of all the roads."""
-        return self.roads[0].wheels
-
-    @property
-    def columns(self) -> Columns:
-        """That of all the roads."""
-        return self.roads[0].columns
-
 
 def superposed(*roads: AbstractRoad) -> Superposed:
     """The sum of roads: a bump on a rough surface, a measured profile on a long swell.
@@ -217,24 +120,8 @@ class Joined(AbstractRoad):
         return before + after - self.second.height(jnp.zeros(1, time.dtype))
 
     @property
-    def wheels(self) -> int:
-        """That of both roads."""
-        return self.first.wheels
-
-    @property
-    def columns(self) -> Columns:
-        """That of both roads."""
-        return self.first.columns
-
-    @property
-    def speed(self) -> Scalar | None:
-        """The speed [m/s] that the roads have in common."""
-        return common_speed((self.first, self.second))
-
-    @property
-    def grid(self) -> float | None:
-        """The finer of the two grids [s]."""
-        return least([self.first.grid, self.second.grid])
+    def _parts(self) -> tuple[AbstractRoad, ...]:
+        return self.first, self.second
 
     @property
     def duration(self) -> float | None:
@@ -253,14 +140,12 @@ class Joined(AbstractRoad):
         return None if rest is None else float(np.min(at)) + rest
 
     @property
-    def shortest_event(self) -> float | None:
-        """The shorter of those of the two roads [s]."""
-        return least([self.first.shortest_event, self.second.shortest_event])
-
-    @property
     def span(self) -> tuple[Scalar | float, Scalar | float]:
         """From the beginning of the first road to the end of the second [s]."""
         return self.first.span[0], self.at + self.second.span[1]
+
+    def reseeded(self, seed: int) -> None:
+        """None: what was joined is not drawn again."""
 
 
 def joined(first: AbstractRoad, second: AbstractRoad, *, at: ScalarLike | int | None = None) -> Joined:

@@ -10,8 +10,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Scalar, Signal, SignalLike
-from jaxdamp.roads._events import fade_in
-from jaxdamp.roads.base import AbstractRoad, Columns
+from jaxdamp.roads.base import AbstractRoad, Columns, fade_in
 
 
 # How far outside the record a time may lie before it is refused, in samples: rounding must not count.

@@ -72,11 +72,6 @@ class InPhase(AbstractOnOneRoad):
         return self.road.height(time)
 
     @property
-    def speed(self) -> Scalar | None:
-        """That of the road [m/s]."""
-        return self.road.speed
-
-    @property
     def columns(self) -> Columns:
         """The tracks of the road, under all axles at once."""
         return Columns("in phase", self.road.wheels)

@@ -1,17 +1,72 @@
-"""The base class of all roads."""
+"""The base class of all roads, and what events on them share."""
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jax.tree_util import Partial
 from jaxtyping import Array, ArrayLike, Float
 
+from jaxdamp import _checks
 from jaxdamp._forked import refuse_fork
-from jaxdamp._types import Scalar, SignalLike
+from jaxdamp._limits import within
+from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
+
+
+def raised_cosine(fraction: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
+    """S(s) = (1 - cos(pi s))/2 for 0 <= s <= 1, 0 before and 1 after; continuous with its slope."""
+    return 0.5 * (1.0 - jnp.cos(jnp.pi * within(fraction, 0.0, 1.0)))
+
+
+def quintic_step(fraction: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
+    """S(s) = s^3 (10 - 15 s + 6 s^2) for 0 <= s <= 1, 0 before and 1 after; continuous with slope and curvature.
+
+    Its steepest slope is 15/8 and its largest curvature 10/sqrt(3), against pi/2 and pi^2/2 of the raised cosine.
+    """
+    s = within(fraction, 0.0, 1.0)
+    return s**3 * (10.0 + s * (6.0 * s - 15.0))
+
+
+def fade_in(time: Signal, ramp: float) -> Signal | Scalar:
+    """The factor that lets a road begin at height and slope zero: S(t/ramp), or 1 throughout if `ramp` [s] is zero."""
+    return raised_cosine(time / ramp) if ramp else jnp.ones((), time.dtype)
+
+
+def given_in_time(
+    name: str,
+    value: ScalarLike | int | None,
+    unit: str,
+    distance_name: str,
+    distance: ScalarLike | int | None,
+    speed: ScalarLike | int | None,
+) -> bool:
+    """Whether `value`, a time or a frequency, was given (and not the distance with the speed); refuses anything else.
+
+    Raises:
+        ValueError: If not exactly one of `value` and `distance` is given, if `speed` is missing with the distance or
+            given with the value, or if one of the three is not positive.
+    """
+    if (value is None) == (distance is None):
+        both = "neither was given" if value is None else f"{value} {unit}, and {distance_name} {distance} m as well"
+        _checks.refuse(
+            name, f"be given, or `{distance_name}` with `speed`, but not both", both, "Give exactly one of them."
+        )
+    if value is not None:
+        if speed is not None:
+            _checks.refuse(
+                "speed", f"be left out when `{name}` is given", speed, f"Give `{distance_name}` and `speed` instead."
+            )
+        _checks.positive(name, value)
+        return True
+    if speed is None:
+        _checks.refuse("speed", f"be given with `{distance_name}`", speed, "Give the speed of the vehicle in m/s.")
+    _checks.positive(distance_name, distance)
+    _checks.positive("speed", speed, "Roads are driven forwards.")
+    return False
 
 
 class Columns(NamedTuple):
@@ -61,8 +116,8 @@ class AbstractRoad(eqx.Module):
     Roads are created by the functions of `jaxdamp.roads`. They are pytrees: their array leaves (heights, speed,
     roughness) can be traced, batched and differentiated. A road of your own defines `heights_at`; call `height`.
 
-    The default properties are those of a formula of time: one track, no speed, no samples, no start and no end. Other
-    roads override them.
+    The default properties are those of a formula of time: one track, no speed, no samples, no start and no end; of a
+    road that is made of others, what these have in common. Other roads override them.
     """
 
     @_for_jit
@@ -83,46 +138,73 @@ class AbstractRoad(eqx.Module):
         """The same for times in a row: what the kinds of roads define."""
 
     @property
+    def _parts(self) -> tuple["AbstractRoad", ...]:
+        """The roads that it is made of."""
+        return ()
+
+    @property
     def wheels(self) -> int:
         """The number of columns of `height`."""
-        return 1
+        return self._parts[0].wheels if self._parts else 1
 
     @property
     def speed(self) -> Scalar | None:
-        """The speed of the vehicle [m/s] that the road was created for; `None` for a road given over time only."""
-        return None
+        """The speed of the vehicle [m/s] that the road was created for; `None` for a road given over time only.
+
+        `None` also of a road that is made of roads for different speeds.
+        """
+        speeds = [road.speed for road in self._parts if road.speed is not None]
+        known = [value for value in map(_checks.concrete, speeds) if value is not None]
+        if not speeds or any(not np.allclose(value, known[0], rtol=1e-6, atol=0.0) for value in known):
+            return None
+        return speeds[0]
 
     @property
     def columns(self) -> Columns:
         """The meaning of the columns of `height`."""
-        return Columns("road", self.wheels)
+        return self._parts[0].columns if self._parts else Columns("road", self.wheels)
 
     @property
     def grid(self) -> float | None:
         """The spacing [s] of the samples the road is made of; `None` if it is a formula, or if its speed is traced."""
-        return None
+        return _least(road.grid for road in self._parts)
 
     @property
     def duration(self) -> float | None:
         """The time [s] after which the road ends or repeats; `None` if it does neither, or if its speed is traced."""
-        return None
+        return _least(road.duration for road in self._parts)
 
     @property
     def span(self) -> tuple[Scalar | float, Scalar | float]:
         """The first and the last time [s] at which the road has a height; infinite where it has no such end."""
-        return -math.inf, math.inf
+        spans = [road.span for road in self._parts]
+        if len(spans) < 2:
+            return spans[0] if spans else (-math.inf, math.inf)
+        first, last = (jnp.stack([jnp.asarray(time, float) for time in ends]) for ends in zip(*spans, strict=True))
+        return jnp.max(first), jnp.min(last)
 
     @property
     def longest_run(self) -> float | None:
         """The longest run [s] in which a random road does not repeat; `None` if there is no such limit."""
-        return None
+        return _least(road.longest_run for road in self._parts)
 
     @property
     def shortest_event(self) -> float | None:
         """The time [s] that a wheel takes over the shortest bump or hole, which steps must not skip; `None` if none."""
-        return None
+        return _least(road.shortest_event for road in self._parts)
 
     def reseeded(self, seed: int) -> "AbstractRoad | None":
-        """The same kind of road with other random numbers; `None` if nothing in it is random or can be drawn again."""
-        del seed
-        return None
+        """The same kind of road with other random numbers; `None` if nothing in it is random or can be drawn again.
+
+        Tracks of one surface stay as coherent as they are.
+        """
+        others = [road.reseeded(seed) for road in self._parts]
+        if all(other is None for other in others):
+            return None
+        chosen = tuple(road if other is None else other for road, other in zip(self._parts, others, strict=True))
+        return eqx.tree_at(lambda own: own._parts, self, chosen)
+
+
+def _least(times: Iterable[float | None]) -> float | None:
+    """The least of the times that are known [s]."""
+    return min((time for time in times if time is not None), default=None)

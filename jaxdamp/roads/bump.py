@@ -12,8 +12,7 @@ from jaxdamp import _checks
 from jaxdamp._limits import within
 from jaxdamp._traced import behind
 from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
-from jaxdamp.roads._events import given_in_time, quintic_step, raised_cosine
-from jaxdamp.roads.base import AbstractRoad
+from jaxdamp.roads.base import AbstractRoad, given_in_time, quintic_step, raised_cosine
 
 
 @final

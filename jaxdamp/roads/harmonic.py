@@ -9,8 +9,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._limits import within
 from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
-from jaxdamp.roads._events import fade_in, given_in_time
-from jaxdamp.roads.base import AbstractRoad
+from jaxdamp.roads.base import AbstractRoad, fade_in, given_in_time
 
 
 @final

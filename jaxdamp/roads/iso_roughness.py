@@ -13,14 +13,13 @@ from jaxdamp import _checks
 from jaxdamp._random import rayleigh, uniform
 from jaxdamp._traced import behind
 from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
-from jaxdamp.roads._events import fade_in
-from jaxdamp.roads.base import AbstractRoad
-from jaxdamp.roads.iso_classes import (
+from jaxdamp.roads.assessment import (
     HIGHEST_SPATIAL_FREQUENCY,
     LOWEST_SPATIAL_FREQUENCY,
     displacement_psd,
     roughness,
 )
+from jaxdamp.roads.base import AbstractRoad, fade_in
 
 
 Lines = Float[Array, " lines"]

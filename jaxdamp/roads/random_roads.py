@@ -14,7 +14,7 @@ from jaxdamp._limits import largest
 from jaxdamp._random import normal, uniform
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp.roads._sampled import AbstractProcess, SampledRoad
-from jaxdamp.roads.iso_classes import LOWEST_SPATIAL_FREQUENCY, REFERENCE_SPATIAL_FREQUENCY, roughness
+from jaxdamp.roads.assessment import LOWEST_SPATIAL_FREQUENCY, REFERENCE_SPATIAL_FREQUENCY, roughness
 
 
 @jax.jit(static_argnames=("first", "size"))

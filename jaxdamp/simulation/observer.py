@@ -58,9 +58,9 @@ def recorded(
     system: System,
     heights: Float[Array, "time wheels"],
     dt: Scalar,
-    start: Float[Array, " n"] | RunState | None = None,
-    every: int = 1,
-    edges: RoadEdges | None = None,
+    start: Float[Array, " n"] | RunState | None,
+    every: int,
+    edges: RoadEdges | None,
 ) -> tuple[Saved, PyTree]:
     """Motion (q, q̇) and element forces at every instant of the road, or every so many-th; what the engine says of it.
 
@@ -72,7 +72,7 @@ def recorded(
         system: the vehicle.
         heights: of the road under each wheel [m, up], shape (time, wheels).
         dt: step of the heights [s].
-        start: q and q̇ at the beginning, shape (n,), or where an earlier run stopped; at rest if left out.
+        start: q and q̇ at the beginning, shape (n,), or where an earlier run stopped; at rest if None.
         every: number of instants from one that is saved to the next.
         edges: the road beyond both ends of a run that goes on.
     """

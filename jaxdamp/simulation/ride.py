@@ -209,7 +209,7 @@ class Ride(eqx.Module):
         heights, step = self.of_vehicle(vehicle).heights, jnp.asarray(self.dt, dtype=float)
         assert heights is not None
         system = vehicle.system()
-        saved, _ = recorded(self.engine, system, heights, step)
+        saved, _ = recorded(self.engine, system, heights, step, None, 1, None)
         return range_uses(vehicle, system.form, saved.motion, saved.road, saved.road_rate, saved.port_force)
 
     def equivalent_dampers(self, point: Mapping[str, object] | None = None) -> dict[str, EquivalentDamper]:

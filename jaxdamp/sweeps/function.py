@@ -94,13 +94,6 @@ def chosen_mode(
 ) -> Mode | None:
     """The mode of differentiation: the one asked for, or the cheaper of those that pass; None for values alone.
 
-    Arguments:
-        function: which may have `derivatives`.
-        gradients: as in `sweep`.
-        inputs: number of the axes.
-        results: number of the results that are differentiated.
-        reversible: whether no loop of unknown length stands in the way of reverse derivatives.
-
     Raises:
         ValueError: a mode that the function does not pass.
     """

@@ -174,14 +174,7 @@ class Gathered:
 
     @classmethod
     def of(cls, kept: Kept, names: Sequence[str], indices: np.ndarray, stored: Mapping[str, np.ndarray]) -> "Gathered":
-        """Of the results of a block.
-
-        Arguments:
-            kept: which points and histograms.
-            names: of the results that are one number.
-            indices: of the points in the sweep.
-            stored: results, and where and why there are none.
-        """
+        """Of the results of a block."""
         columns = {name: np.asarray(stored[name], np.float64) for name in names}
         reasons, counts = np.unique(np.asarray(stored["reason"], str), return_counts=True)
         why = {str(r): int(n) for r, n in zip(reasons, counts, strict=True) if r}

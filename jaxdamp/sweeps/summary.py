@@ -220,15 +220,7 @@ def summarise(
     cluster: Cluster,
     progress: Callable[[int, int], None] | None,
 ) -> SweepSummary:
-    """Compute all blocks that are not done, and give what was gathered.
-
-    Arguments:
-        program: the sweep.
-        summary: what is kept.
-        path: of a store; None for the memory.
-        cluster: as in `jaxdamp.sweep`.
-        progress: as in `jaxdamp.sweep`.
-    """
+    """Compute all blocks that are not done, and give what was gathered."""
     _checks.instance("summary", summary, Summary, "say what is kept", "Write `summary=sweeps.Summary(...)`.")
     kept = summary.checked(program.scalars)
     store = HeldSummary(program, kept) if path is None else SummaryStore(program, kept, path)

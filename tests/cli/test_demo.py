@@ -5,8 +5,8 @@ import pytest
 
 from jaxdamp import bench
 from jaxdamp.bench import SineTest
+from jaxdamp.cli.chaining import TRUE, Scenario, run_demo
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.demo import TRUE, Scenario, run_demo
 from jaxdamp.cli.jobs import Output
 from jaxdamp.dampers import Besinger
 from jaxdamp.export import from_json

@@ -98,7 +98,9 @@ def test_only_what_one_side_takes_alone_is_in_a_branch() -> None:
     declared, condition, branch, neg, last = in_branches(before, (), {"chosen"})
     assert isinstance(declared, Declare) and isinstance(branch, Branch)
     assert (declared.target, condition, neg, last) == (costly, before[0], before[2], choice)
-    assert branch.case == case and not branch.bodies[0] and branch.bodies[1][0].operation == "exp"
+    first = branch.bodies[1][0]
+    assert branch.case == case and not branch.bodies[0]
+    assert isinstance(first, Define) and first.operation == "exp"
     for outside in ({"chosen", "costly"}, {"chosen", "cheap", "costly"}):
         assert in_branches(before, (), outside) == before
     assert in_branches(before, [Define(number("more"), "neg", (costly,))], {"chosen", "more"}) == before

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import Ride, roads, sweep, vehicles
-from jaxdamp.codegen import _cuda, _lanes, _native, _scan, compiler, printed_scan
+from jaxdamp.codegen import _lanes, _native, _scan, compiler, printed_scan
 from jaxdamp.dampers import Besinger, BoucWen, Lag, PowerLaw, SeriesSpring
 from jaxdamp.simulation import Exponential, simulate
 from jaxdamp.sweeps import running
@@ -143,7 +143,7 @@ def test_the_kernel_of_a_ride(monkeypatch, name):
 
 def usage(text, architecture):
     """Registers of a thread and bytes spilt."""
-    report = _cuda.kernel(text, architecture).report
+    report = _native.kernel(text, architecture).report
     return [int(re.findall(pattern, report)[0]) for pattern in (r"Used (\d+) registers", r"(\d+) bytes spill stores")]
 
 
@@ -152,40 +152,40 @@ def test_the_kernel_for_a_device(monkeypatch):
     pytest.importorskip("nvidia.cuda_nvrtc")
     devices = [SimpleNamespace(platform="gpu", compute_capability=number) for number in ("8.0", "9.0", "9.0")]
     kernels = []
-    monkeypatch.setattr(_cuda.jax, "local_devices", lambda: devices)
-    monkeypatch.setattr(_cuda.jax, "default_backend", lambda: "gpu")
+    monkeypatch.setattr(_native.jax, "local_devices", lambda: devices)
+    monkeypatch.setattr(_native.jax, "default_backend", lambda: "gpu")
     monkeypatch.setattr(
-        _cuda, "launcher", lambda images, real=_cuda.launcher: (kernels.append(images), real(images))[1]
+        _native, "launcher", lambda images, real=_native.launcher: (kernels.append(images), real(images))[1]
     )
     with pytest.raises(jax.errors.JaxRuntimeError, match=r"printed for the GPU, and runs on a processor.*default_dev"):
         jax.block_until_ready(jax.vmap(oscillator(printed_scan))(jnp.linspace(0.5, 3.0, 5)))
     assert [image[:4] for image in kernels[0]] == [b"\x7fELF"] * 2 and kernels[0][0] != kernels[0][1]
     with jax.default_device(jax.devices("cpu")[0]):
-        assert not _cuda.on_gpu()
+        assert not _native.on_gpu()
 
 
 def test_the_right_compiler_of_several(monkeypatch):
     def installed(*versions):
-        found = [_cuda.Compiler(ctypes.CDLL(None), (major, 0), frozenset(known)) for major, known in versions]
-        monkeypatch.setattr(_cuda, "compilers", lambda: found)
+        found = [_native.Compiler(ctypes.CDLL(None), (major, 0), frozenset(known)) for major, known in versions]
+        monkeypatch.setattr(_native, "compilers", lambda: found)
 
     installed((12, [80, 90]), (13, [90, 100]), (11, [80]))
-    monkeypatch.setattr(_cuda, "driver_version", lambda: None)
-    assert [_cuda.compiler_for(a).version[0] for a in (80, 90, 100)] == [12, 13, 13]
-    monkeypatch.setattr(_cuda, "driver_version", lambda: (12, 4))
-    assert [_cuda.compiler_for(a).version[0] for a in (80, 90)] == [12, 12]
+    monkeypatch.setattr(_native, "driver_version", lambda: None)
+    assert [_native.compiler_for(a).version[0] for a in (80, 90, 100)] == [12, 13, 13]
+    monkeypatch.setattr(_native, "driver_version", lambda: (12, 4))
+    assert [_native.compiler_for(a).version[0] for a in (80, 90)] == [12, 12]
     message = r"for sm_100 and a driver of CUDA 12\.4: installed: 12\.0 \(up to sm_90\), 13\.0 \(up to sm_100\)"
     with pytest.raises(NotImplementedError, match=message):
-        _cuda.compiler_for(100)
+        _native.compiler_for(100)
     installed()
     with pytest.raises(NotImplementedError, match=r"none is installed\. Install `nvidia-cuda-nvrtc-cu12`"):
-        _cuda.compiler_for(90)
+        _native.compiler_for(90)
 
 
 def test_a_text_that_is_no_kernel():
     pytest.importorskip("nvidia.cuda_nvrtc")
     with pytest.raises(NotImplementedError, match=r"NVRTC does not compile.*error"):
-        _cuda.kernel("nothing", 90)
+        _native.kernel("nothing", 90)
 
 
 def test_refused_by_name(monkeypatch):

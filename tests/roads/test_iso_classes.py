@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from jaxdamp.roads import class_limits, road_class
-from jaxdamp.roads.iso_classes import ROUGHNESS_PSD, displacement_psd
+from jaxdamp.roads.assessment import ROUGHNESS_PSD, displacement_psd
 
 
 def test_limits_of_the_standard():

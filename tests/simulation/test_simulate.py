@@ -174,7 +174,7 @@ def test_batches_equal_loops_and_both_modes_of_differentiation_agree():
     @jax.jit
     def square(force):
         system = replace(car, {"damper.compression_force": force}).system()
-        run, _ = recorded(Exponential(), system, heights, jnp.asarray(1e-3))
+        run, _ = recorded(Exponential(), system, heights, jnp.asarray(1e-3), None, 1, None)
         return jnp.mean(run.motion[:, 2] ** 2)
 
     np.testing.assert_allclose(jax.vmap(square)(forces), [square(f) for f in forces], rtol=1e-12)

@@ -12,7 +12,7 @@ from jaxdamp._one_thread import one_thread
 from jaxdamp.bench.analysis import FoldedCycles, as_records, fold_cycles
 from jaxdamp.bench.contradictions import repeats
 from jaxdamp.bench.evaluation import curve
-from jaxdamp.bench.evaluation.measurements import Measurement, measured, record_measurements
+from jaxdamp.bench.evaluation.curve import Measurement, measured, record_measurements
 from jaxdamp.bench.evaluation.result import Evaluation
 from jaxdamp.bench.evaluation.separation import GasAndFriction, separate_gas_and_friction
 from jaxdamp.bench.runs import BenchRun

@@ -11,13 +11,11 @@ from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Table
 from jaxdamp.bench.analysis import FoldedCycles, fold_cycles
-from jaxdamp.bench.evaluation.measurements import Measurement, measured
+from jaxdamp.bench.evaluation.curve import LOW_SPEED, LOWEST_SHARE, Measurement, measured
 from jaxdamp.bench.motion import Samples
 from jaxdamp.bench.runs import BenchRun
 
 
-LOW_SPEED = 0.05  # m/s, up to which damping is taken as a straight line or a parabola
-LOWEST_SHARE = 0.3  # of the range of velocities, below which friction is not fully there
 _COLLINEAR = 100.0  # condition number from which friction and damping cannot be told apart
 _BINS = 40  # of the stroke, for the curves
 _CLEAR = 6.0  # standard deviations of the ratio of variances from which the damping is curved

@@ -3,8 +3,7 @@
 import numpy as np
 
 from jaxdamp.bench.motion import Samples
-from jaxdamp.bench.preflight.artefacts import MAINS, SHARE, runs_of
-from jaxdamp.bench.preflight.finding import Examined, Finding, step
+from jaxdamp.bench.preflight.finding import MAINS, SHARE, Examined, Finding, runs_of, step
 
 
 UNITS = {"stroke": "m", "force": "N"}
