@@ -29,6 +29,7 @@ EXAMPLES = Path(__file__).parent / "build" / "examples"
 QUICKLY = [
     "--xla_backend_optimization_level=0",
     "--xla_cpu_parallel_codegen_split_count=1",  # parts of a program repeat what they share: a quarter of large ones
+    "--xla_disable_hlo_passes=hlo-verifier",  # looks for errors of the compiler itself after each step: a twelfth
     *["--xla_cpu_use_fusion_emitters=false"] * (jax.__version_info__ < (0, 11)),
 ]
 os.environ.setdefault("XLA_FLAGS", " ".join(QUICKLY))

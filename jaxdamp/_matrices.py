@@ -19,6 +19,8 @@ _TERMS = 13  # of the Taylor series at a norm of one half or less: its rest is b
 def solve(matrix: Inexact[Array, "n n"], right: Inexact[Array, "n *columns"]) -> Inexact[Array, "n *columns"]:
     """X of A X = B for a small regular matrix, by elimination with row exchange; differentiable in both."""
     matrix, right = varying_as((matrix, right))
+    if matrix.shape[0] == 1:
+        return right / matrix.reshape((1,) * right.ndim)
 
     def times(x: Array) -> Array:
         return matrix @ x
@@ -34,11 +36,19 @@ def _eliminate(matrix: Array, right: Array) -> Array:
     rows = jnp.concatenate([matrix, right.reshape(n, -1)], axis=1)
     numbers = jnp.arange(n)
 
+    def taken(values: Array, k: Array, axis: int) -> Array:
+        return jax.lax.dynamic_index_in_dim(values, k, axis, keepdims=False, allow_negative_indices=False)
+
+    def put(values: Array, row: Array, k: Array) -> Array:
+        return values.at[k].set(row, mode="promise_in_bounds", wrap_negative_indices=False)
+
     def step(k: Array, rows: Array) -> Array:
-        pivot = jnp.argmax(jnp.where(numbers >= k, jnp.abs(rows[:, k]), -1.0))
-        chosen = rows[pivot] / rows[pivot, k]
-        rows = rows.at[pivot].set(rows[k])
-        return (rows - jnp.outer(rows[:, k], chosen)).at[k].set(chosen)
+        column = taken(rows, k, 1)
+        pivot = jnp.argmax(jnp.where(numbers >= k, jnp.abs(column), -1.0))
+        chosen = taken(rows, pivot, 0)
+        chosen = chosen / taken(chosen, k, 0)
+        rows = put(rows, taken(rows, k, 0), pivot)
+        return put(rows - taken(rows, k, 1)[:, None] * chosen[None], chosen, k)
 
     return jax.lax.fori_loop(0, n, step, rows)[:, n:].reshape(right.shape)
 

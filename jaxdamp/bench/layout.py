@@ -18,6 +18,7 @@ from jaxdamp.bench.units import is_unit, is_usual
 
 DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "white space", "|": "vertical bar"}
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*([eEdD][+-]?\d+)?|\.\d+([eEdD][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
+_DIGIT = re.compile(r"\d")
 _NUMERIC = 0.9  # share of numbers that makes a column one of the record rather than one with gaps
 Rows = Sequence[tuple[int, list[str]]]  # number of the line, from 1, and its cells
 
@@ -42,8 +43,17 @@ def split(line: str, delimiter: str) -> list[str]:
 
 def number(cell: str, delimiter: str) -> float | None:
     """The number in a cell, or None. Without a comma as delimiter, a comma is a decimal sign."""
-    cell = cell.replace(",", ".") if delimiter != "," else cell
-    return float(cell.lower().replace("d", "e")) if NUMBER.fullmatch(cell) else None
+    return float(with_point(cell, delimiter).lower().replace("d", "e")) if is_number(cell, delimiter) else None
+
+
+def is_number(cell: str, delimiter: str) -> bool:
+    """Whether a cell holds a number."""
+    return NUMBER.fullmatch(with_point(cell, delimiter)) is not None
+
+
+def with_point(cell: str, delimiter: str) -> str:
+    """A cell with a point as decimal sign."""
+    return cell.replace(",", ".") if delimiter != "," else cell
 
 
 @dataclass(frozen=True)
@@ -58,7 +68,7 @@ class Layout:
 
     def has_value(self, cell: str) -> bool:
         """Whether a cell holds a number or a time stamp."""
-        return number(cell, self.delimiter) is not None or is_stamp(cell)
+        return is_number(cell, self.delimiter) or is_stamp(cell)
 
     def values_in(self, cells: Sequence[str]) -> int:
         """How many columns of the record hold a number or a time stamp in this row; 0 if its width is another."""
@@ -83,7 +93,7 @@ def layout_of(rows: Rows, delimiter: str) -> Layout | None:
     filled = np.array([[bool(cell) for cell in row] for row in cells])
     full = np.flatnonzero(values.sum(axis=0) >= _NUMERIC * len(cells))
     numeric = np.flatnonzero(2 * numbers.sum(axis=0) > filled.sum(axis=0))
-    digits = sum(sum(map(str.isdigit, cells[row][column])) for row, column in np.argwhere(values))
+    digits = len(_DIGIT.findall(" ".join(cells[row][column] for row, column in np.argwhere(values))))
     return (
         Layout(delimiter, len(cells[0]), tuple(full.tolist()), tuple(numeric.tolist()), digits) if len(full) else None
     )
@@ -93,7 +103,7 @@ def _rows_of_one_width(rows: Rows, delimiter: str) -> tuple[list[list[str]], np.
     """The rows with numbers that have the most frequent width, and which of their cells are numbers, and values."""
     chosen = []
     for _, cells in rows:
-        numbers = [number(cell, delimiter) is not None for cell in cells]
+        numbers = [is_number(cell, delimiter) for cell in cells]
         values = [is_number or is_stamp(cell) for is_number, cell in zip(numbers, cells, strict=True)]
         if any(numbers) and sum(values) >= min(2, len(cells)):
             chosen.append((cells, numbers, values))

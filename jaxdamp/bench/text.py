@@ -165,7 +165,7 @@ def text_lines(file: Path) -> list[str]:
 def _choose(file: Path, top: list[tuple[int, str]], given: str | None) -> Layout:
     """The layout with the delimiter given, or with the one that fits best."""
     candidates = [*DELIMITERS] if given in DELIMITERS or given is None else [*DELIMITERS, given]
-    layouts = {d: layout_of([(n, split(line, d)) for n, line in top], d) for d in candidates}
+    layouts = _layouts(top, [d for d in candidates if _divides(d, top)])
     fitting = {d: layout for d, layout in layouts.items() if layout is not None and len(layout.full) > 1}
     best = max(fitting.values(), key=lambda layout: layout.score, default=None)
     if given in fitting:
@@ -177,12 +177,21 @@ def _choose(file: Path, top: list[tuple[int, str]], given: str | None) -> Layout
     kind = _other_format(top[0][1])
     if best is not None and not kind:
         return best
-    if any(layouts.values()) and not kind:
+    if not kind and any(_layouts(top, candidates).values()):
         raise ValueError(
             f"{file} has only one column of numbers: a record needs at least the stroke and the force, side by side, "
             "divided by comma, semicolon, tab, white space or vertical bar."
         )
     raise ValueError(f"{file} holds no rows of numbers: its first line is {top[0][1][:80]!r}.{kind}")
+
+
+def _divides(delimiter: str, top: list[tuple[int, str]]) -> bool:
+    """Whether any line has several cells with this delimiter."""
+    return any(len(line.split()) > 1 if delimiter == " " else delimiter in line for _, line in top)
+
+
+def _layouts(top: list[tuple[int, str]], delimiters: list[str]) -> dict[str, Layout | None]:
+    return {d: layout_of([(n, split(line, d)) for n, line in top], d) for d in delimiters}
 
 
 def _other_format(first: str) -> str:

@@ -236,8 +236,12 @@ def _nearest(kinds: Sequence[_Kind], spreads: Sequence[Spread], owners: tuple[in
             return _nearest_of_one(law, curved, spread, scale)
 
         own, own_slopes = _each(of_one, kind.law, len(kind.answers), spread, kind.scale)
-        constant = constant.at[kind.answers].set(own)
-        slopes = slopes.at[kind.answers[:, :, None], kind.motions[:, None, :]].set(own_slopes)
+        rows, columns = (
+            np.eye(answers, dtype=own.dtype)[kind.answers],
+            np.eye(slopes.shape[1], dtype=own.dtype)[kind.motions],
+        )
+        constant += jnp.tensordot(own, rows, 2)
+        slopes += jnp.tensordot(jnp.swapaxes(own_slopes @ columns, 1, 2), rows, ((0, 2), (0, 1))).T
     return LinearLaws(constant, slopes, owners)
 
 
@@ -247,10 +251,10 @@ def _nearest_of_one(
     """Constant and slopes by (v, x, s) of one law: E[y tᵀ] L⁻¹ for z = z̄ + L t with uncorrelated t of variance one."""
     count, places = 2 + law.initial_state().size, np.array(curved, dtype=int)
     mean = spread.mean * scale
+    placing = np.eye(count, dtype=mean.dtype)[:, places]
 
     def at(curved_values: Array) -> Array:
-        values = jnp.zeros(count).at[places].set(curved_values)
-        return values
+        return jnp.asarray(placing) @ curved_values
 
     def answers(values: Array) -> Array:
         return _answers(law, list(values))
@@ -264,7 +268,7 @@ def _nearest_of_one(
     average = weights @ values
     secant = ((values - average[None]) * weights[:, None]).T @ points
     own = solve(lower.T, secant.T).T
-    return average - own @ mean, slopes.at[:, places].set(own)
+    return average - own @ mean, jnp.where(placing.any(axis=1), own @ placing.T, slopes)
 
 
 def _triangle(correlation: Float[Array, " pairs"], size: int) -> Float[Array, "size size"]:

@@ -61,9 +61,6 @@ from jaxdamp.testing import CHECKS, check_alike_ports, check_inside_wrappers, ch
 from jaxdamp.testing.law_checks import SLOTS
 
 
-pytestmark = pytest.mark.users_flags
-
-
 def degressive(knee_width=1e-3, offset=0.0):
     return PowerLaw(1800.0, 0.4, 900.0, 0.5, offset, 0.7 * offset, knee_width=knee_width)
 
@@ -283,6 +280,7 @@ def test_every_law_is_held_to_the_contract():
 IN_PLACES = {"inside wrappers", "alike ports"}  # these run below, the second with several laws in a car
 
 
+@pytest.mark.users_flags
 @pytest.mark.parametrize(
     "name",
     [
@@ -322,6 +320,7 @@ def test_at_alike_ports_in_single_precision(group):
 
 
 @pytest.mark.slow
+@pytest.mark.users_flags
 def test_the_whole_contract_of_one_law_in_single_and_double_precision():
     check_law(Linear(1500.0))
     with jax.enable_x64(False):

@@ -15,6 +15,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.text import Text
+from matplotlib.transforms import Bbox, BboxBase
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
@@ -115,10 +116,22 @@ def test_lines_that_have_a_name_stand_out(figures: dict[str, Figure]) -> None:
                 assert contrast(line.get_color()) >= 2.5, (name, line.get_label())
 
 
-def test_no_code_is_printed(figures: dict[str, Figure], runs: BenchSet) -> None:
+Printed = list[tuple[str, Bbox]]  # texts of a figure and where they stand
+
+
+def printed_in(figure: Figure) -> Printed:
+    return [(text.get_text(), text.get_window_extent()) for text in texts(figure)]
+
+
+@pytest.fixture(scope="module")
+def printed_in_each(figures: dict[str, Figure]) -> dict[str, Printed]:
+    return {name: printed_in(figure) for name, figure in figures.items()}
+
+
+def test_no_code_is_printed(printed_in_each: dict[str, Printed], runs: BenchSet) -> None:
     files = re.compile("|".join(re.escape(run.name) for run in runs))  # the reader's names stay as they are
-    for name, figure in figures.items():
-        printed = [text.get_text() for text in texts(figure)]
+    for name, texts_of_one in printed_in_each.items():
+        printed = [text for text, _ in texts_of_one]
         mathtext = re.compile(r"\$.*?\$")  # a power of ten of a logarithmic axis
         bad = [text for text in printed if re.search(r"\w_\w|\^|->|`", mathtext.sub("", files.sub("", text)))]
         assert not bad, (name, bad)
@@ -137,9 +150,8 @@ def at_width(figure: Figure, share: float) -> Iterator[Figure]:
     figure.set_size_inches(width, height)
 
 
-def check_text(name: str, figure: Figure) -> None:
+def check_text(name: str, page: BboxBase, boxes: Printed) -> None:
     """No text leaves the page, and none lies on another."""
-    page, boxes = figure.bbox, [(text.get_text(), text.get_window_extent()) for text in texts(figure)]
     for text, box in boxes:
         assert box.x0 >= page.x0 - 1 and box.x1 <= page.x1 + 1, (name, text)
         assert box.y0 >= page.y0 - 1 and box.y1 <= page.y1 + 1, (name, text)
@@ -149,9 +161,9 @@ def check_text(name: str, figure: Figure) -> None:
         assert wide <= 0.0 or high <= 0.0 or wide * high <= 0.1 * lesser, (name, one, other)
 
 
-def test_text_has_its_place(figures: dict[str, Figure]) -> None:
+def test_text_has_its_place(figures: dict[str, Figure], printed_in_each: dict[str, Printed]) -> None:
     for name, figure in figures.items():
-        check_text(name, figure)
+        check_text(name, figure.bbox, printed_in_each[name])
 
 
 @pytest.mark.slow
@@ -159,7 +171,7 @@ def test_text_has_its_place_in_narrow_and_wide_figures(figures: dict[str, Figure
     for name, figure in figures.items():
         for share in () if is_page(name) else WIDTHS:
             with at_width(figure, share):
-                check_text(f"{name} at {share:g} of its width", figure)
+                check_text(f"{name} at {share:g} of its width", figure.bbox, printed_in(figure))
 
 
 def test_a_sheet_says_the_verdict_that_the_result_has(comparison: Comparison, tuned: TuneResult) -> None:
@@ -174,20 +186,27 @@ def test_a_sheet_says_the_verdict_that_the_result_has(comparison: Comparison, tu
 # ---- golden pictures
 
 
+@contextlib.contextmanager
+def laid_out(figure: Figure) -> Iterator[None]:
+    """A figure whose axes stay where its layout puts them, however often it is drawn."""
+    engine = figure.get_layout_engine()
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    yield
+    figure.set_layout_engine(engine)
+
+
 def panels(figure: Figure) -> Image.Image:
     """What is drawn inside the axes, one below the other, without text: alike with any font and layout."""
-    figure.draw_without_rendering()
-    engine = figure.get_layout_engine()
-    figure.set_layout_engine("none")
     words = [artist for kind in (Text, Legend) for artist in figure.findobj(kind) if artist.get_visible()]
     written, scale = io.BytesIO(), 110.0 / figure.dpi
     with contextlib.ExitStack() as stack:
         for artist in words:
             artist.set_visible(False)
             stack.callback(artist.set_visible, True)
-        figure.savefig(written, dpi=110)
-    figure.set_layout_engine(engine)
-    whole = Image.open(written).convert("RGB")
+        figure.savefig(written, dpi=110, format="rgba")
+    size = int(figure.bbox.width * scale), int(figure.bbox.height * scale)
+    whole = Image.frombytes("RGBA", size, written.getvalue()).convert("RGB")
     every = [axes for axes in figure.axes if axes.get_label() != "<colorbar>"]
     width = max(int((90_000 / len(every)) ** 0.5) // 12 * 12, 108)
     below = Image.new("RGB", (width, 3 * width // 4 * len(every)))
@@ -222,7 +241,8 @@ def golden(name: str) -> Image.Image:
 def test_the_pictures_are_drawn_as_before(figures: dict[str, Figure]) -> None:
     """`JAXDAMP_REDRAW=1 pytest tests/plots/test_house_style.py` draws the golden pictures anew: look at each."""
     for name, figure in figures.items():
-        drawn = panels(figure)
+        with laid_out(figure):
+            drawn = panels(figure)
         if "JAXDAMP_REDRAW" in os.environ:
             notes = PngInfo()
             notes.add_text("matplotlib", VERSION)
@@ -242,10 +262,11 @@ def test_a_curve_that_is_missing_or_has_another_colour_is_noticed(name: str, fig
     lines = [line for axes in figures[name].axes for line in axes.get_lines() if line.get_color() == blue]
     lines = [line for line in lines if np.size(line.get_xdata()) > 10]  # not of the sketch of a vehicle
     line = next(line for line in lines if line.get_linestyle() == "-" and line.get_linewidth() > 1.3)
-    for change, back in (({"visible": False}, {"visible": True}), ({"color": "#D55E00"}, {"color": blue})):
-        line.set(**change)
-        assert changed(golden(name), panels(figures[name])) > TOLERATED, change
-        line.set(**back)
+    with laid_out(figures[name]):
+        for change, back in (({"visible": False}, {"visible": True}), ({"color": "#D55E00"}, {"color": blue})):
+            line.set(**change)
+            assert changed(golden(name), panels(figures[name])) > TOLERATED, change
+            line.set(**back)
 
 
 # ---- whole figures at three widths

@@ -85,13 +85,14 @@ def test_clicks_are_chosen_and_swept() -> None:
 def test_combinations_that_a_law_refuses_are_left_out_and_counted() -> None:
     law = dampers.PiecewiseLinear(np.array([-0.3, 0.1]), np.array([1500.0, 2500.0, 1500.0]))
     car = vehicles.presets.quarter_car_000(law)
-    result = tune.minimise(COMFORT, car, WHITE, over={"knots": tune.Choice([-0.5, 0.2, 0.5])})  # knots increase
+    bump, run = roads.cosine_bump(0.03, start=0.02, duration=0.1), tune.Run(duration=0.3, dt=2e-3)
+    result = tune.minimise(COMFORT, car, bump, over={"knots": tune.Choice([-0.5, 0.2, 0.5])}, **run)  # knots increase
     assert result.combinations is not None and len(result.combinations.met) == 3
     assert "is the best of 3 combinations (6 more are impossible)" in result.summary
     three = dampers.PiecewiseLinear(np.array([-0.3, 0.1, 0.2]), np.array([1500.0, 2500.0, 1500.0, 900.0]))
     car = vehicles.presets.quarter_car_000(three)
     with pytest.raises(ValueError, match=r"`over` must have a combination of damper.knots.* that the vehicle can have"):
-        tune.minimise(COMFORT, car, WHITE, over={"knots": tune.Choice([-0.5, 0.5])})
+        tune.minimise(COMFORT, car, bump, over={"knots": tune.Choice([-0.5, 0.5])}, **run)
 
 
 def test_choices_without_effect_at_the_start_are_driven() -> None:

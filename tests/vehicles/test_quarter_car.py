@@ -80,6 +80,9 @@ def test_lyapunov_solution_is_that_of_scipy(rng):
     q = q @ q.T
     expected = scipy.linalg.solve_continuous_lyapunov(a, -q)
     np.testing.assert_allclose(lyapunov(jnp.asarray(a), jnp.asarray(q)), expected, rtol=1e-9, atol=1e-12)
+    rates = np.logspace(-6, 5, 6)  # slow and fast motions side by side: in P, q over the sum of their rates
+    found = lyapunov(jnp.asarray(np.diag(-rates)), jnp.asarray(q))
+    np.testing.assert_allclose(found, q / (rates[:, None] + rates), rtol=1e-9)
 
 
 def test_states_of_a_law_take_part():
