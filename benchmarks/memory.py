@@ -46,7 +46,7 @@ def main() -> None:
     def saved(every: int) -> Callable[[Array, Array], Array]:
         def run(heights: Array, rate: Array) -> Array:
             changed = replace(ride.vehicle, {path: rate})
-            saved, _ = recorded(Exponential(), changed.system(), heights, jnp.asarray(DT), every=every)
+            saved, _ = recorded(Exponential(), changed.system(), heights, jnp.asarray(DT), None, every, None)
             return saved.motion
 
         return run

@@ -64,7 +64,9 @@ def main() -> None:
         coarse = np.asarray(heights)
         first, warm = timed(on_road(car, coarse, DT))
         _, saved = first_and_warm(
-            lambda car=car, heights=heights: recorded(Exponential(), car.system(), heights, jnp.asarray(DT))[0]
+            lambda car=car, heights=heights: recorded(
+                Exponential(), car.system(), heights, jnp.asarray(DT), None, 1, None
+            )[0]
         )
         exact = simulate(
             car,
