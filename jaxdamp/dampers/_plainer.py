@@ -22,7 +22,9 @@ def curve_samples(law: AbstractMemoryless, fastest: float) -> tuple[np.ndarray, 
 
 
 @eqx.filter_jit
-def _curve(law: AbstractMemoryless, velocity: np.ndarray) -> Float[Array, " samples"]:
+def _curve(
+    law: AbstractMemoryless, velocity: Float[Array, " samples"] | Float[np.ndarray, " samples"]
+) -> Float[Array, " samples"]:
     """In one program: JAX would compile each operation."""
     return eqx.filter_vmap(law.force_velocity)(velocity)
 

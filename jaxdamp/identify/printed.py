@@ -19,7 +19,7 @@ from jaxdamp._triangles import triangle
 from jaxdamp.dampers import laws_inside
 from jaxdamp.identify.model import Model, starts_in
 from jaxdamp.identify.printed_law import PrintedLaw, numbers_on_rig, plain_rig, printed_law, say
-from jaxdamp.identify.printed_records import PRINTED, MachineNumbers, Row, rows_of
+from jaxdamp.identify.printed_records import PRINTED, MachinePlaces, Row, rows_of
 from jaxdamp.identify.problem import AbstractResiduals
 from jaxdamp.identify.traces import Batch
 from jaxdamp.parameters import FreeParameters, get, with_values
@@ -59,7 +59,7 @@ def predicted(batch: Batch, model: Model) -> Float[np.ndarray, "runs time"] | No
     law = printed_law(numbers[0], None)
     if law is None:
         return None
-    forces, none = [], MachineNumbers(-1, -1, -1)
+    forces, none = [], MachinePlaces(-1, -1, -1)
     for p, row in zip((own.flat for own in numbers), rows_of(batch), strict=True):
         record = row.on_machine(law.machine(p).delay)
         forces.append(row.shown(law.forces(p, record)[:, None], record, law.machine(p), none)[:, 0])
@@ -110,7 +110,7 @@ class Evaluator:
             record = row.on_machine(numbers.delay)
             forces = np.zeros((record.used, self.free + 1))
             self.law.linearise(at, record, columns, forces)
-            shown = row.shown(forces, record, numbers, self.law.machine(taken))
+            shown = row.shown(forces, record, numbers, self.law.columns_of_machine(taken))
             out[place : place + len(shown)] = row.missed(shown)
         return out
 

@@ -14,7 +14,7 @@ from jaxtyping import Array, Float, Int
 from jaxdamp.codegen import Constant, Signature, Symbols, library, symbols, with_slopes
 from jaxdamp.dampers import laws_inside, margins
 from jaxdamp.identify.model import Model, OnRig, law_of, rig_of
-from jaxdamp.identify.printed_records import MachineNumbers, Record
+from jaxdamp.identify.printed_records import MachineNumbers, MachinePlaces, Record
 from jaxdamp.rig import LawNumbers, Rig, gas_and_friction, numbers_of
 
 
@@ -137,7 +137,7 @@ class PrintedLaw:
         self.conditions = int(jax.eval_shape(lambda: margins(model)).size) if conditional else 0
         ends = np.cumsum([0, *(array.size for array in numbers.arrays)])
         rig = numbers.built([int(end) for end in ends[:-1]]).rig  # the place of each number
-        self._machine = MachineNumbers(*map(int, (rig.force_delay, rig.moving_mass, rig.force_lag)))
+        self._machine = MachinePlaces(*map(int, (rig.force_delay, rig.moving_mass, rig.force_lag)))
         places = np.concatenate([ends[:0], *(np.arange(ends[i], ends[i + 1]) for i in free)])
         delay = np.flatnonzero(places == self._machine.delay)
         rows = np.eye(max(self.slopes, 1), self.lanes, dtype=int)
@@ -168,9 +168,13 @@ class PrintedLaw:
         data = row.weight.ctypes.data, row.force.ctypes.data, column.ctypes.data
         self._record(p.ctypes.data, row.used, *_motion(row), *data, out.shape[1], out.ctypes.data)
 
-    def machine(self, flat: np.ndarray) -> MachineNumbers:
-        """The numbers of the machine among all, or what else stands in their places."""
-        return MachineNumbers(*(flat[place] for place in self._machine))
+    def machine(self, p: Float[np.ndarray, " numbers"]) -> MachineNumbers:
+        """The numbers of the machine among all."""
+        return MachineNumbers(*(float(p[place]) for place in self._machine))
+
+    def columns_of_machine(self, taken: Int[np.ndarray, " numbers"]) -> MachinePlaces:
+        """Which free numbers those of the machine take."""
+        return MachinePlaces(*(int(taken[place]) for place in self._machine))
 
     def margins(
         self, p: Float[np.ndarray, " numbers"]

@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 from collections.abc import Sequence
-from typing import Generic, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -11,17 +11,24 @@ from jaxtyping import Float
 from jaxdamp.identify.traces import Batch
 
 
-T = TypeVar("T")
 PRINTED = ("delay", "inertia", "lag", "command_lag")  # effects of a machine that are computed here
 Samples = Float[np.ndarray, " time"]
 
 
-class MachineNumbers(NamedTuple, Generic[T]):
-    """What the numbers of a machine that act here are, or where they stand."""
+class MachineNumbers(NamedTuple):
+    """The numbers of a machine that act here."""
 
-    delay: T  # s
-    mass: T  # kg
-    lag: T  # s
+    delay: float  # s
+    mass: float  # kg
+    lag: float  # s
+
+
+class MachinePlaces(NamedTuple):
+    """Where these numbers stand, or their derivatives: −1 where there are none."""
+
+    delay: int
+    mass: int
+    lag: int
 
 
 class Motion(NamedTuple):
@@ -102,8 +109,8 @@ class Row:
         self,
         forces: Float[np.ndarray, "fine columns"],
         record: Record,
-        numbers: MachineNumbers[float],
-        columns: MachineNumbers[int],
+        numbers: MachineNumbers,
+        columns: MachinePlaces,
     ) -> Float[np.ndarray, "time columns"]:
         """What the force channel shows of forces, the last column, and their derivatives, the others.
 
@@ -111,7 +118,7 @@ class Row:
             forces: of the law in the record, which are changed.
             record: `on_machine`.
             numbers: of the machine.
-            columns: of the derivatives by them, −1 where there is none.
+            columns: of the derivatives by them.
         """
         if "inertia" in self.effects:
             acceleration = slopes(record.motion.velocity) / (record.step * record.parts)
