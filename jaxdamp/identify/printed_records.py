@@ -102,8 +102,9 @@ class Row:
         if "lag" in self.effects:
             first, *others = (each.at_parts() for each in (first, *others))
             parts = 1
-        count = first.stroke.size
-        return Record(first, others[0] if others else None, parts, step, np.ones(count), np.zeros(count), count)
+        count, fine = first.stroke.size, self.parts // parts
+        used = max((self.used - 1) * fine + 1, 0)
+        return Record(first, others[0] if others else None, parts, step, np.ones(count), np.zeros(count), used)
 
     def shown(
         self,
@@ -121,11 +122,11 @@ class Row:
             columns: of the derivatives by them.
         """
         if "inertia" in self.effects:
-            acceleration = slopes(record.motion.velocity) / (record.step * record.parts)
+            acceleration = slopes(record.motion.velocity)[: len(forces)] / (record.step * record.parts)
             forces[:, -1] += numbers.mass * acceleration
             _add(forces, columns.mass, acceleration)
             if record.by_delay is not None:
-                change = slopes(record.by_delay.velocity) / (record.step * record.parts)
+                change = slopes(record.by_delay.velocity)[: len(forces)] / (record.step * record.parts)
                 _add(forces, columns.delay, numbers.mass * change)
         if "lag" not in self.effects:
             return forces
@@ -134,9 +135,12 @@ class Row:
         return forces[:: self.parts]
 
     def missed(self, shown: Float[np.ndarray, "time columns"]) -> Float[np.ndarray, "time columns"]:
-        """The weighted difference from what was measured, the last column, and its derivatives."""
-        shown[:, -1] -= self.force
-        return np.where(self.weight[:, None] > 0, shown * self.weight[:, None], 0.0)
+        """The weighted difference from what was measured, the last column, and its derivatives, in the same place."""
+        weight = self.weight[: len(shown)]
+        shown[:, -1] -= self.force[: len(shown)]
+        shown *= weight[:, None]
+        shown[~(weight > 0)] = 0.0  # beside a force that is no number too
+        return shown
 
 
 def _add(forces: Float[np.ndarray, "time columns"], column: int, change: Samples) -> None:
