@@ -205,8 +205,7 @@ def _predicting(
     Such a record begins as warm as its first cycles show, about the mean of the others.
     """
     out = [int(i) for i, left in zip(fitted, part, strict=True) if left.all()]
-    paths = result.own_starts
-    if not isinstance(models, list) or not out or not paths:
+    if not isinstance(models, list) or not out or not (paths := result.own_starts):
         return models, [0] * len(result.runs)
     others = [model for i, model in enumerate(models) if i not in out]
     mean = {path: np.mean([np.asarray(get(model, path)) for model in others]) for path in paths}

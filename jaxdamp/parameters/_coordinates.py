@@ -69,7 +69,7 @@ class Coordinates(eqx.Module):
         """Physical values of coordinates; NumPy arrays for NumPy arrays."""
         parts = zip(self.free.chosen, self.units, self.free.split(y), strict=True)
         maps = ((p.domain.from_raw, p, u, a) for p, u, a in parts)
-        return _joined([of(_plain(p, a), _scale(p)) if self._is_smooth(p) else a * u for of, p, u, a in maps])
+        return _joined([of(_plain(p, a), _scale(p)) if _is_smooth(self.smooth, p) else a * u for of, p, u, a in maps])
 
     def on_host(self) -> "HostMap | None":
         """The map to physical values with its derivatives, by NumPy alone; None if a domain has not written them."""
@@ -77,7 +77,7 @@ class Coordinates(eqx.Module):
         smooth = []
         for p, unit, end in zip(self.free.chosen, self.units, ends, strict=True):
             own = slice(int(end) - p.value.size, int(end))
-            if not self._is_smooth(p):
+            if not _is_smooth(self.smooth, p):
                 slopes[own, own] = np.diag(np.ravel(np.asarray(unit)))
             elif p.domain.slopes is None:
                 return None
@@ -89,7 +89,7 @@ class Coordinates(eqx.Module):
         """Coordinates of physical values; NumPy arrays for NumPy arrays."""
         parts = zip(self.free.chosen, self.units, self.free.split(values), strict=True)
         maps = ((p.domain.to_raw, p, u, a) for p, u, a in parts)
-        return _joined([of(_plain(p, a), _scale(p)) if self._is_smooth(p) else a / u for of, p, u, a in maps])
+        return _joined([of(_plain(p, a), _scale(p)) if _is_smooth(self.smooth, p) else a / u for of, p, u, a in maps])
 
     @property
     def start(self) -> Float[np.ndarray, " free"]:
@@ -101,7 +101,7 @@ class Coordinates(eqx.Module):
         lower, upper = [], []
         for p, unit in zip(self.free.chosen, self.units, strict=True):
             low, high, margin = -np.inf, np.inf, 0.0
-            if not self._is_smooth(p):
+            if not _is_smooth(self.smooth, p):
                 low, high = p.domain.lower, p.domain.upper
                 belongs = not (_has_range(p) or p.domain.ordered) and p.domain.contains(np.asarray(low))
                 margin = 0.0 if belongs else OPEN_END
@@ -116,7 +116,7 @@ class Coordinates(eqx.Module):
         ends = np.cumsum([p.value.size for p in self.free.chosen])
         rows, gaps = [np.zeros((0, units.size))], [np.zeros(0)]
         for p, end in zip(self.free.chosen, ends, strict=True):
-            if p.domain.ordered and not self._is_smooth(p):
+            if p.domain.ordered and not _is_smooth(self.smooth, p):
                 own = np.arange(end - p.value.size, end)
                 rows.append(np.diff(np.diag(units)[own], axis=0))
                 gaps.append(np.full(own.size - 1, LEAST_GAP * units[own].max()))
@@ -139,9 +139,6 @@ class Coordinates(eqx.Module):
     def ordered(self) -> Bool[np.ndarray, " free"]:
         """Which numbers belong to ordered vectors."""
         return np.array([p.domain.ordered for p in self.free.owners])
-
-    def _is_smooth(self, p: Parameter) -> bool:
-        return self.smooth == "all" or (self.smooth == "ordered" and p.domain.ordered)
 
 
 class HostMap(NamedTuple):
@@ -166,6 +163,11 @@ class HostMap(NamedTuple):
             assert domain.slopes is not None
             values[own], slopes[own, own] = domain.from_raw(y[own], scale), domain.slopes(y[own], scale)
         return values, slopes
+
+
+def _is_smooth(smooth: str, p: Parameter) -> bool:
+    """Whether a parameter has a smooth map; no method, which equinox binds anew for each of many calls."""
+    return smooth == "all" or (smooth == "ordered" and p.domain.ordered)
 
 
 def _has_range(p: Parameter) -> bool:

@@ -290,16 +290,17 @@ def least_squares_on_host(
     y = np.array(start, np.float64)
     state = solver.init(linearise, y, None, options, None, None, none)
     y = np.asarray(state.trial)
+    step, terminate = solver.step, solver.terminate  # equinox binds a method anew whenever it is named
     while True:
-        ended, _ = solver.terminate(linearise, y, None, options, state, none)
+        ended, _ = terminate(linearise, y, None, options, state, none)
         lanes = np.flatnonzero(~ended & (state.steps < max_steps))
         if not lanes.size:
             break
         if lanes.size == len(y):
-            y, state, _ = solver.step(linearise, y, lanes, options, state, none)
+            y, state, _ = step(linearise, y, lanes, options, state, none)
             continue
         some = jtu.tree_map(lambda leaf: leaf[lanes], state)  # noqa: B023
-        some_y, some, _ = solver.step(linearise, y[lanes], lanes, options, some, none)
+        some_y, some, _ = step(linearise, y[lanes], lanes, options, some, none)
         y, state = _put(lanes, (some_y, some), (y, state))
     edged = at_edges(y, rules_of(solver, np, y))
     lanes = np.flatnonzero(np.any(edged != y, axis=1))
