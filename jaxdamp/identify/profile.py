@@ -23,7 +23,7 @@ from jaxdamp.solve import BoundedLevenbergMarquardt
 STEPS = 15  # of each search; an incomplete search makes an error smaller, never larger
 LOOSE = 0.3  # standard errors: 0.1 in chi-square
 PATIENCE = 4  # points tried without such a decrease: near kinks more is predicted than comes true
-MOST_STEPS = 400  # of all searches together; parameters after that have their linear errors
+MOST_STEPS = 600  # of all searches together; parameters after that have their linear errors
 CHI_SQUARE = 9.0  # increase up to which a moved parameter still fits: three standard errors
 GROWTH = 4.0  # of the distance, from one step to the next
 CURVE_STEPS = 60  # of each search

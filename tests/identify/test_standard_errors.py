@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from jaxdamp.bench import BenchRun, SineTest, VirtualDyno
-from jaxdamp.dampers import Besinger, Bilinear, Linear, PiecewiseLinear
-from jaxdamp.identify import fit
+from jaxdamp.dampers import Besinger, Bilinear, Linear, LuGre, PiecewiseLinear, Spring
+from jaxdamp.identify import default_ladder, estimating, fit, profile
 from jaxdamp.identify.estimating import uncertainty, weak_directions
 from jaxdamp.identify.noise import Noise, _corrected, autocorrelation, correlation_time
 
@@ -135,3 +135,24 @@ def test_a_knot_between_equal_slopes_is_not_identifiable(sines):
     assert notes == ["not identifiable", "", "not identifiable"]
     told = [warning for warning in result.warnings if warning.startswith("knots[2] is not identifiable")]
     assert len(told) == 1 and told[0].endswith("the curve hardly bends there. Take one with fewer knots.")
+
+
+def test_all_certain_numbers_are_moved_away(monkeypatch):
+    """Of a law with many numbers in doubt, not only the first: each search ends where it gains nothing more."""
+    law = LuGre.guess(np.array([-0.3, 0.0, 0.3]), np.array([-600.0, 100.0, 900.0])) + Linear(1500.0) + Spring(2000.0)
+    tests = [SineTest(0.02, 1.0, cycles=3), SineTest(0.02, 4.0, cycles=3)]
+    runs = VirtualDyno(law, sampling_rate=400.0, force_noise=10.0, seed=2).run(tests)
+    plain, moved, certain = profile.Searches.end, set(), []
+
+    def end(searches, values, max_steps, *, held=None, solver=None):
+        moved.update(() if held is None else [held])
+        return plain(searches, values, max_steps, held=held, solver=solver)
+
+    def profiled(problem, found, errors, far, chosen, variance):
+        certain.extend(np.flatnonzero(chosen & (errors > 0)))
+        return profile.profile(problem, found, errors, far, chosen, variance)
+
+    monkeypatch.setattr(profile.Searches, "end", end)
+    monkeypatch.setattr(estimating, "profile", profiled)
+    fit(default_ladder(runs, ["visco_plastic_spring"])["visco_plastic_spring"], runs, starts=1)
+    assert len(certain) > 6 and moved == set(certain)
