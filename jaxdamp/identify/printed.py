@@ -105,6 +105,7 @@ class Evaluator:
             at, columns = self._at(p, taken, values), self._columns(taken)
             if not row.effects:
                 self.law.linearise(at, row.still, columns, out[place:])
+            if not (row.effects and row.used):  # no sample of a record that is left out counts
                 continue
             numbers = self.law.machine(at)
             record = row.on_machine(numbers.delay)
