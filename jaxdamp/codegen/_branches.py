@@ -22,7 +22,8 @@ from jaxdamp.codegen._program import (
 
 
 CHEAP = frozenset(
-    "add sub mul neg abs max min lt le gt ge eq ne and or xor not select copy convert sign look_up is_finite".split()
+    "add sub mul div sqrt neg abs max min lt le gt ge eq ne and or xor not select copy convert sign look_up "
+    "is_finite".split()
 )
 
 

@@ -43,11 +43,7 @@ class _Estimate(Protocol):
 
 @runtime_checkable
 class FittedLaw(Protocol):
-    """A law with uncertain parameters, as `identify.fit` gives it.
-
-    `parameters` have a `name` and the names of numbers `tied` to them; `covariance` is theirs, in their units and
-    order, infinite for parameters that the records do not determine.
-    """
+    """A law with uncertain parameters, as `identify.fit` gives it."""
 
     @property
     def law(self) -> AbstractDamper:
@@ -56,12 +52,12 @@ class FittedLaw(Protocol):
 
     @property
     def parameters(self) -> Sequence[_Estimate]:
-        """The estimates."""
+        """The estimates, each with its `name` and the names of the numbers `tied` to it."""
         ...
 
     @property
     def covariance(self) -> Float[np.ndarray, "free free"]:
-        """Of the estimates."""
+        """Of the estimates, in their units and order; infinite for those that the records do not determine."""
         ...
 
 
@@ -267,10 +263,9 @@ def _metrics_of(
     ride: ScenarioRide,
 ) -> tuple[_DamperMetrics, list[str]]:
     """The metrics of a damper on all roads side by side, with exact derivatives by its estimates."""
-    law = damper if isinstance(damper, AbstractDamper) else damper.law
+    law, estimates = (damper, []) if isinstance(damper, AbstractDamper) else (damper.law, damper.parameters)
     free = free_parameters(law)
-    estimates, names = ([], free.names) if isinstance(damper, AbstractDamper) else (damper.parameters, free.names)
-    effects = _effects(estimates, names)
+    effects = _effects(estimates, free.names)
     order = [m.name for m in ride.metrics]
     values, slopes = _metrics_on_roads(ride, vehicle, free, jnp.asarray(effects), order)
     values, slopes = np.asarray(values, np.float64), np.asarray(slopes, np.float64).mean(axis=0)

@@ -77,7 +77,8 @@ def assert_as_xla(name, rig, runs) -> None:
     for answer, right in zip(answers, expected, strict=True):
         assert answer.shape == right.shape
         scale = np.max(np.abs(right), axis=0, initial=1e-300)
-        assert np.all(np.abs(answer - right) <= 1e-9 * np.maximum(scale, 1e-9 * np.max(scale, initial=0.0)))  # zero to rounding
+        scale = np.maximum(scale, 1e-9 * np.max(scale, initial=0.0))  # of a column that is zero to rounding
+        assert np.all(np.abs(answer - right) <= 1e-9 * scale)
     reduced = by_c.triangle(whole)
     assert np.allclose(reduced.T @ reduced, whole.T @ whole, rtol=1e-9, atol=1e-9 * np.max(np.abs(whole)) ** 2)
     model = problem.free.build(jnp.asarray(values))
