@@ -152,8 +152,9 @@ def command(name: str) -> Command:
             module, _, function = target.rpartition(".")
             screen = console.Screen()
             arguments = options.build(target, {("screen",): screen, **read})
-            with console.showing(given, screen), noted:
-                getattr(import_module(f"jaxdamp.{module}"), function)(**arguments)
+            perform = getattr(import_module(f"jaxdamp.{module}"), function)
+            with console.showing(given, screen), noted, console.beside(name):
+                perform(**arguments)
 
     switch = inspect.Parameter("debug", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=DEBUG)
     made = [*options.parameters(name, target), switch]

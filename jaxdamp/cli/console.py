@@ -5,7 +5,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 from unicodedata import category
@@ -174,6 +174,23 @@ def prepare(*, quickly: bool) -> None:
         configure()
     except RuntimeError:
         jax.config.update("jax_enable_x64", True)
+
+
+_SIDE_BY_SIDE = ("fit", "report", "demo")  # commands that fit several laws
+
+
+def beside(command: str) -> AbstractContextManager[None]:
+    """Processes for a command whose work goes side by side."""
+    from jaxdamp import _second_process
+
+    return _second_process.opened(_ready) if command in _SIDE_BY_SIDE else nullcontext()
+
+
+def _ready() -> None:
+    """What a process does before it is told anything."""
+    import jax
+
+    jax.devices()
 
 
 @contextmanager

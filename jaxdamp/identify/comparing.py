@@ -8,6 +8,7 @@ from typing import Any, ClassVar, ParamSpec, Protocol, cast, overload, runtime_c
 from jaxdamp._pieces import piece
 from jaxdamp._progress import Progress
 from jaxdamp._results import plotted
+from jaxdamp._second_process import anywhere
 from jaxdamp._tables import Contents, Table, with_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Figure
@@ -19,6 +20,7 @@ from jaxdamp.identify.held_out import HeldOut, on_records, without_parts
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import OFFSET, Machine, absent_paths, started_machine
 from jaxdamp.identify.model import on_rig
+from jaxdamp.identify.printed_law import WithPrinted, remember
 from jaxdamp.identify.reducing import reduced
 from jaxdamp.identify.rungs import Failure, Rung, ladder_table, verdict
 from jaxdamp.identify.scheduling import fit_scheduled, settings_stated
@@ -220,21 +222,14 @@ def fit_each(
     def fitted(name: str, start: Start, held: tuple[str, ...] = ()) -> Rung | Failure:
         own = naming_only(named, _paths(start, runs, rig), known.values()) if known else named
         own = {**own, "rig": rig, "freeze": (*own["freeze"], *held)}
-        return piece(
-            ("law", name, start, tuple(runs), tuple(held_out), scheduled, own), lambda: outcome(name, start, own)
-        )
+        given = (name, start, tuple(runs), tuple(held_out), scheduled, own)
 
-    def outcome(name: str, start: Start, how: dict[str, Any]) -> Rung | Failure:
-        try:
-            by_setting = fit_scheduled(start, runs, progress=lambda text: None, **how) if scheduled else None
-            result = by_setting.result if by_setting else fit(start, runs, **how)
-            judged = _judged(start, result, held_out, scheduled)
-        except NUMERICAL as error:
-            return Failure(name, str(error))
-        own = (name, len(result.parameters), result.fit_percent, result.rmse)
-        if judged is None:
-            return Rung(*own, None, None, result, result.scores, by_setting)
-        return Rung(*own, judged.fit_percent, judged.rmse, result, judged.scores, by_setting, judged.words)
+        def compute() -> Rung | Failure:
+            result, printed = anywhere(WithPrinted(_outcome), *given, shared=(*runs, *held_out))
+            remember(printed)
+            return result
+
+        return piece(("law", *given), compute)
 
     def simpler(source: Rung, law: AbstractDamper, held: tuple[str, ...]) -> Rung | Failure:
         return fitted(source.name, law, (*frozen_by(laws[source.name]), *held))
@@ -245,6 +240,27 @@ def fit_each(
         yield one
     if rungs and not scheduled:
         yield from reduced(rungs, simpler, progress)
+
+
+def _outcome(
+    name: str,
+    start: Start,
+    runs: Sequence[BenchRun],
+    held_out: Sequence[BenchRun],
+    scheduled: bool,
+    how: dict[str, Any],
+) -> Rung | Failure:
+    """The fit of one law of a comparison, judged."""
+    try:
+        by_setting = fit_scheduled(start, runs, progress=lambda text: None, **how) if scheduled else None
+        result = by_setting.result if by_setting else fit(start, runs, **how)
+        judged = _judged(start, result, held_out, scheduled)
+    except NUMERICAL as error:
+        return Failure(name, str(error))
+    own = (name, len(result.parameters), result.fit_percent, result.rmse)
+    if judged is None:
+        return Rung(*own, None, None, result, result.scores, by_setting)
+    return Rung(*own, judged.fit_percent, judged.rmse, result, judged.scores, by_setting, judged.words)
 
 
 def _paths(start: Start, runs: Sequence[BenchRun], rig: Machine) -> list[str]:

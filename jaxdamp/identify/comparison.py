@@ -11,6 +11,7 @@ from typing import ClassVar, Generic, TypeVar, cast
 import jax
 import jax.numpy as jnp
 
+from jaxdamp import _second_process
 from jaxdamp._results import AbstractResult
 from jaxdamp._status import Status
 from jaxdamp._tables import Contents
@@ -147,7 +148,8 @@ def side_by_side(
         with jax.enable_x64(double):
             return fitted(name, start)
 
-    pool = ThreadPoolExecutor(max_workers=min(os.cpu_count() or 1, MOST_THREADS))
+    most = 1 + _second_process.count() if _second_process.count() else min(os.cpu_count() or 1, MOST_THREADS)
+    pool = ThreadPoolExecutor(max_workers=most)
     try:
         waiting = {name: pool.submit(in_precision, name, start) for name, start in starts.items()}
         for name, outcome in waiting.items():

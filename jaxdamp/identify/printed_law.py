@@ -5,7 +5,7 @@ import functools
 import logging
 import threading
 from collections.abc import Callable, Hashable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -128,7 +128,7 @@ class PrintedLaw:
     """The C functions of a structure of a law, and which arrays of its numbers they are differentiated by."""
 
     def __init__(self, numbers: LawNumbers, free: tuple[int, ...]) -> None:
-        model = numbers.built(numbers.arrays)
+        self.model = model = numbers.built(numbers.arrays)
         self.free, shapes = free, [array.shape for array in numbers.arrays]
         self.slopes = sum(numbers.arrays[i].size for i in free)
         self.lanes = LANES * max(-(-self.slopes // LANES), 1)
@@ -149,11 +149,22 @@ class PrintedLaw:
         )
         functions = _functions(numbers, self.states, self.conditions)
         text += "".join(each.text(name, shapes, free, delay.size > 0) for name, each in functions.items())
-        text += _RECORD + _CONDITIONS * bool(self.conditions)
-        self._record, self._conditions = library(text).record, getattr(library(text), "conditions", None)
-        pointer, whole = ctypes.c_void_p, ctypes.c_int64
+        self._text = text + _RECORD + _CONDITIONS * bool(self.conditions)
+        self._load()
+
+    def _load(self) -> None:
+        compiled, pointer, whole = library(self._text), ctypes.c_void_p, ctypes.c_int64
+        self._record, self._conditions = compiled.record, getattr(compiled, "conditions", None)
         self._record.argtypes = [pointer, whole, whole, *[pointer] * 8, ctypes.c_double, *[pointer] * 3, whole, pointer]
         self._record.restype = None
+
+    def __getstate__(self) -> dict[str, object]:
+        """For another process, which loads the functions anew."""
+        return {name: value for name, value in self.__dict__.items() if name not in ("_record", "_conditions")}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        self.__dict__.update(state)
+        self._load()
 
     def forces(self, p: Float[np.ndarray, " numbers"], row: Record) -> Float[np.ndarray, " time"]:
         """The force [N] at every instant of a record."""
@@ -213,8 +224,36 @@ def printed_law(numbers: LawNumbers, free: set[int] | None) -> PrintedLaw | None
             _refused[numbers.key] = str(error)
             say(f"{type(numbers.built(numbers.arrays).law).__name__} is computed by XLA. {error}")
             return None
-        _laws.setdefault(numbers.key, []).append(law)
+        with _LOCK:
+            _laws.setdefault(numbers.key, []).append(law)
         return law
+
+
+class WithPrinted(NamedTuple):
+    """A function whose result comes with the laws that were printed for it, for `remember` in another process."""
+
+    function: Callable[..., Any]
+
+    def __call__(self, *arguments: object) -> tuple[Any, list[PrintedLaw]]:
+        """The result, and the laws."""
+        before = set(map(id, _printed()))
+        result = self.function(*arguments)
+        return result, [law for law in _printed() if id(law) not in before]
+
+
+def _printed() -> list[PrintedLaw]:
+    with _LOCK:
+        return [law for laws in _laws.values() for law in laws]
+
+
+def remember(laws: Sequence[PrintedLaw]) -> None:
+    """Laws that another process has printed need not be printed here."""
+    for law in laws:
+        key = numbers_of(law.model).key
+        with _LOCK:
+            known = _laws.setdefault(key, [])
+            if all(law.free != other.free for other in known):
+                known.append(law)
 
 
 @functools.cache
