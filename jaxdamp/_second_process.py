@@ -6,9 +6,11 @@ free while this process is busy. Without them everything is computed here.
 
 import atexit
 import ctypes
+import functools
 import io
 import os
 import pickle
+import select
 import signal
 import socket
 import sys
@@ -16,7 +18,7 @@ import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, BinaryIO, TypeVar
+from typing import Any, BinaryIO, Generic, TypeVar
 
 from jaxdamp._forked import started
 
@@ -42,8 +44,8 @@ class Process:
         self.pid, self._ends, self._stream = pid, ends, ends.makefile("rwb")
         self._known: list[object] = []
 
-    def call(self, function: Callable[..., T], arguments: Sequence[object], shared: Sequence[object]) -> T:
-        """The result of a function; what it raises is raised.
+    def begin(self, function: Callable[..., object], arguments: Sequence[object], shared: Sequence[object]) -> None:
+        """Tell it to compute.
 
         Arguments:
             function: one that a module holds by name, or a method of an object that can be pickled.
@@ -51,7 +53,6 @@ class Process:
             shared: objects inside the arguments that are sent once, and come back as the same objects.
 
         Raises:
-            Lost: the process has ended.
             Unsent: the function or its arguments cannot be pickled.
         """
         new = [thing for thing in shared if not any(thing is known for known in self._known)]
@@ -59,16 +60,27 @@ class Process:
             content = _pickled(new, ()), _pickled((function, tuple(arguments)), [*self._known, *new])
         except UNPICKLED as error:
             raise Unsent(str(error)) from error
+        self._known += new
         try:
             for part in content:
                 _send(self._stream, part)
-            self._known += new
-            sound, result = _read(self._stream, self._known)
+        except OSError:
+            pass  # it has ended, which `result` says
+
+    def result(self) -> tuple[bool, Any]:
+        """Whether the function raised nothing, and its result or what it raised.
+
+        Raises:
+            Lost: the process has ended.
+        """
+        try:
+            return _read(self._stream, self._known)
         except (EOFError, OSError) as error:
             raise Lost(str(error)) from error
-        if sound:
-            return result
-        raise result
+
+    def has_result(self) -> bool:
+        """Whether it has something to say."""
+        return bool(select.select([self._ends], [], [], 0.0)[0])
 
     def end(self) -> None:
         """Ask it to end when it is done, and wait for that."""
@@ -122,49 +134,105 @@ def _read(stream: BinaryIO, known: Sequence[object]) -> Any:
 
 
 _lock = threading.Lock()
+_all: list[Process] = []
 _free: list[Process] = []
-_state = {"here": 0, "all": 0}  # calls that are computed in this process; how many processes there are beside it
+_here = [0]  # calls of `anywhere` that are computed in this process
 
 
 def count() -> int:
     """How many processes there are beside this one."""
-    return _state["all"]
+    return len(_all)
 
 
-def is_free() -> bool:
-    """Whether a process beside this one waits for work."""
-    return bool(_free)
+class Waiting(Generic[T]):
+    """What another process computes."""
+
+    def __init__(self, process: Process, compute: Callable[[], T]) -> None:
+        self._process, self._compute = process, compute
+        self._answer: tuple[bool, Any] | None = None
+
+    def __call__(self) -> T:
+        """The result, once it is there; what the function raised is raised."""
+        self.settle()
+        assert self._answer is not None
+        sound, result = self._answer
+        if sound:
+            return result
+        raise result
+
+    def settle(self, *, if_ready: bool = False) -> None:
+        """Read the result, so that the process is free; it is computed here where the process has ended."""
+        if self._answer is not None or (if_ready and not self._process.has_result()):
+            return
+        try:
+            self._answer = self._process.result()
+            _release(self._process)
+        except Lost:
+            self._answer = True, self._compute()
+
+
+_begun_elsewhere: list[Waiting] = []
+
+
+def _begun(
+    process: Process, function: Callable[..., T], arguments: Sequence[object], shared: Sequence[object]
+) -> Waiting[T] | None:
+    """None where it cannot be sent."""
+    try:
+        process.begin(function, arguments, shared)
+    except Unsent:
+        _release(process)
+        return None
+    return Waiting(process, functools.partial(function, *arguments))
+
+
+def _release(process: Process) -> None:
+    with _lock:
+        _free.append(process)
+
+
+def _taken() -> Process | None:
+    """A process that has nothing to do."""
+    with _lock:
+        return _free.pop() if _free else None
 
 
 def anywhere(function: Callable[..., T], *arguments: object, shared: Sequence[object] = ()) -> T:
-    """The result of a function: computed here, or in a process that is free while this one computes.
+    """The result of a function: computed here, or in a process that is free while another call is computed here.
 
     Arguments:
-        function: as `Process.call`; what cannot be pickled is computed here.
+        function: as `Process.begin`; what cannot be pickled is computed here.
         arguments: of the function.
-        shared: as `Process.call`.
+        shared: as `Process.begin`.
     """
+    process = _taken() if _here[0] else None
+    waiting = _begun(process, function, arguments, shared) if process is not None else None
+    if waiting is not None:
+        return waiting()
     with _lock:
-        process = _free.pop() if _state["here"] and _free else None
-        _state["here"] += process is None
-    if process is not None:
-        lost = False
-        try:
-            return process.call(function, arguments, shared)
-        except Unsent:
-            pass
-        except Lost:
-            lost = True
-        finally:
-            if not lost:
-                _free.append(process)
-        with _lock:
-            _state["here"] += 1
+        _here[0] += 1
     try:
         return function(*arguments)
     finally:
         with _lock:
-            _state["here"] -= 1
+            _here[0] -= 1
+
+
+def elsewhere(function: Callable[..., T], *arguments: object, shared: Sequence[object] = ()) -> Callable[[], T] | None:
+    """Begin to compute in another process; what is returned waits for the result. None where none is free.
+
+    Arguments:
+        function: as `Process.begin`; what cannot be pickled is not computed.
+        arguments: of the function.
+        shared: as `Process.begin`.
+    """
+    for each in _begun_elsewhere:
+        each.settle(if_ready=True)
+    process = _taken()
+    waiting = _begun(process, function, arguments, shared) if process is not None else None
+    if waiting is not None:
+        _begun_elsewhere.append(waiting)
+    return waiting
 
 
 @contextmanager
@@ -177,14 +245,14 @@ def opened(prepare: Callable[[], object]) -> Iterator[None]:
         prepare: called in each of them at its start, in the time in which this one has nothing to tell it.
     """
     cores = min(len(os.sched_getaffinity(0)), MOST) if sys.platform == "linux" else 1
-    processes = [] if started() else [_forked(prepare) for _ in range(cores - 1)]
-    _free[:], _state["all"] = processes, len(processes)
+    _all[:] = [] if started() else [_forked(prepare) for _ in range(cores - 1)]
+    _free[:] = _all
     try:
         yield
     finally:
-        _free.clear()
-        _state["all"] = 0
-        for process in processes:
+        ending = [*_all]
+        _free.clear(), _all.clear(), _begun_elsewhere.clear()
+        for process in ending:
             process.end()
 
 

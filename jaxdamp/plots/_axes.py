@@ -2,10 +2,7 @@
 
 import functools
 import re
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal
-
-import numpy as np
+from typing import TYPE_CHECKING, Literal
 
 from jaxdamp._display import display
 from jaxdamp._types import Axes
@@ -24,7 +21,7 @@ def label_axis(axes: Axes, name: Literal["x", "y"], label: str, *, turns: bool =
     `times` brings the numbers drawn to the unit of the label; with `turns` the sign is that of the direction, also if
     the label does not say so.
     """
-    from matplotlib.ticker import FuncFormatter, MaxNLocator
+    from matplotlib.ticker import FuncFormatter
 
     axis = axes.xaxis if name == "x" else axes.yaxis
     wrap(axis.set_label_text(display().text(label)), axes)
@@ -33,14 +30,11 @@ def label_axis(axes: Axes, name: Literal["x", "y"], label: str, *, turns: bool =
     factor = times * shown.factor
     if factor == 1.0 or axis.get_scale() != "linear":
         return
+    from jaxdamp.plots._ticks import TicksInUnit
 
-    class Ticks(MaxNLocator):
-        def tick_values(self, vmin: float, vmax: float) -> Any:
-            ends = sorted((factor * vmin, factor * vmax))
-            return np.sort(np.asarray(super().tick_values(*ends)) / factor)
-
-    axis.set_major_locator(Ticks(nbins="auto", steps=[1, 2, 2.5, 4, 5, 10]))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{round(factor * value, 9) + 0.0:g}".replace("-", "−")))
+    ticks = TicksInUnit(factor)
+    axis.set_major_locator(ticks)
+    axis.set_major_formatter(FuncFormatter(ticks.text))
     if factor < 0.0:
         axis.set_inverted(True)
         change = f"{name}lim_changed"
@@ -73,13 +67,10 @@ def few_ticks(axes: Axes, most: int) -> None:
     """At most so many ticks along the abscissa, and no more than its labels have room for, in the unit shown."""
     from matplotlib.ticker import MaxNLocator
 
+    from jaxdamp.plots._ticks import FewTicks
+
     before = axes.xaxis.get_major_locator()
     assert isinstance(before, MaxNLocator)  # of a linear axis
     before.set_params(steps=[1, 2, 2.5, 4, 5, 10])
 
-    class Ticks(MaxNLocator):
-        def tick_values(self, vmin: float, vmax: float) -> "Sequence[float]":
-            before.set_params(nbins=max(min(most, int(0.6 * axes.xaxis.get_tick_space())), 1))
-            return before.tick_values(vmin, vmax)
-
-    axes.xaxis.set_major_locator(Ticks())
+    axes.xaxis.set_major_locator(FewTicks(before, most))

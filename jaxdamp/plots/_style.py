@@ -159,8 +159,12 @@ def plain_log_axis(axis: "matplotlib.axis.Axis") -> None:
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=30))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: short(value)))
+    axis.set_major_formatter(FuncFormatter(_short_tick))
     axis.set_minor_formatter(NullFormatter())
+
+
+def _short_tick(value: float, _: int | None) -> str:
+    return short(value)
 
 
 def label_ends(

@@ -1,5 +1,6 @@
 """The damping ratio that a damper gives body and wheel, over its velocity."""
 
+import functools
 from collections.abc import Mapping
 
 import numpy as np
@@ -98,7 +99,6 @@ def wheel_axis(axes: Axes, critical: list[CriticalDamping]) -> None:
     shares = np.array([float(each.body) / float(each.wheel) for each in critical])
     if np.ptp(shares) <= _SAME * shares[-1]:
         share = float(shares[-1])
-        wheel = axes.secondary_yaxis(
-            "right", functions=(lambda z: np.multiply(z, share), lambda z: np.divide(z, share))
-        )
+        to_wheel, back = functools.partial(np.multiply, share), functools.partial(np.multiply, 1.0 / share)
+        wheel = axes.secondary_yaxis("right", functions=(to_wheel, back))
         wheel.set_ylabel("wheel [–]")

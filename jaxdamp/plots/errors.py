@@ -1,5 +1,6 @@
 """Errors of laws, how a fit was reached and what it could be, and a design of tests."""
 
+import functools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -77,7 +78,7 @@ def _dress_in_newtons(axes: Axes, comparison: Comparison) -> "Line2D":
     title = f"{_style.in_words(best.name)}: {share}"
     _style.dress(axes, "RMSE of the force [N]   (free parameters in brackets)", "", title)
     factor = 100.0 / largest
-    to_percent, back = (lambda x: np.multiply(x, factor)), (lambda x: np.divide(x, factor))
+    to_percent, back = functools.partial(np.multiply, factor), functools.partial(np.multiply, 1.0 / factor)
     shares = axes.secondary_xaxis("top", functions=(to_percent, back))
     shares.set_xlabel("% of the largest force")
     label = f"noise of the force, {_style.short(noise)} N"

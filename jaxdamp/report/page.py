@@ -10,10 +10,12 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from jaxdamp._display import display
+from jaxdamp._second_process import elsewhere
 from jaxdamp._tables import Table
 from jaxdamp._types import Figure
 from jaxdamp._words import first_upper, said
@@ -121,6 +123,18 @@ addEventListener("load", show);
 """
 
 
+class _Block(NamedTuple):
+    """A part of a page with a picture that is still being drawn.
+
+    Attributes:
+        what: of the page it is, for the case that it fails.
+        text: waits for it.
+    """
+
+    what: str
+    text: Callable[[], str]
+
+
 class Report:
     """Headings, sentences, tables and pictures in order, written as one HTML file.
 
@@ -135,9 +149,9 @@ class Report:
         self.attempts = Attempts() if attempts is None else attempts
         self._folder = folder
         self._headings: list[str] = []
-        self._sheets: list[str] = []
-        self._blocks: list[str] = []
-        self._sections: list[list[str]] = []
+        self._sheets: list[str | _Block] = []
+        self._blocks: list[str | _Block] = []
+        self._sections: list[list[str | _Block]] = []
 
     def heading(self, text: str) -> None:
         """Start a section; the page begins with links to all of them. Below a sheet sections are folded."""
@@ -152,16 +166,13 @@ class Report:
             finding: what it says, for those who cannot see it.
             name: of its files, such as "damper_sheet".
         """
-        with self.part(f"The sheet {name}.png"):
-            drawn = figure()
-            image = self._image(drawn, finding, f"{name}.png")
-            also = ""
-            if self._folder is not None:
-                drawn.savefig(self._folder / f"{name}.pdf")
-                also = f'<figcaption>To print or to send: <a href="{name}.pdf">{name}.pdf</a></figcaption>'
-            self._sheets.append(f'<figure class="sheet">{image}{also}</figure>')
+        what, pdf = f"The sheet {name}.png", "" if self._folder is None else f"{name}.pdf"
+        with self.part(what):
+            image = self._image(figure(), finding, f"{name}.png", pdf)
+            also = f'<figcaption>To print or to send: <a href="{pdf}">{pdf}</a></figcaption>' if pdf else ""
+            self._sheets.append(_Block(what, lambda: f'<figure class="sheet">{image()}{also}</figure>'))
 
-    def _add(self, block: str) -> None:
+    def _add(self, block: "str | _Block") -> None:
         (self._sections[-1] if self._sections else self._blocks).append(block)
 
     def verdict(self, *sentences: str, more: Sequence[str] = ()) -> None:
@@ -208,19 +219,32 @@ class Report:
             caption: below the figure.
             name: of the file, such as "ride.png".
         """
-        with self.part(f"The picture {name}"):
+        what = f"The picture {name}"
+        with self.part(what):
             words = said(display().words(caption))
             image = self._image(figure() if callable(figure) else figure, words, name)
-            self._add(f"<figure>{image}<figcaption>{html.escape(words)}</figcaption></figure>")
+            self._add(_Block(what, lambda: f"<figure>{image()}<figcaption>{html.escape(words)}</figcaption></figure>"))
 
-    def _image(self, figure: Figure, words: str, name: str) -> str:
-        """A figure as an element of the page, and as a file if the report has a folder."""
-        data = _png(figure)
-        if self._folder is not None:
-            (self._folder / name).write_bytes(data)
-        source = f"data:image/png;base64,{base64.b64encode(data).decode('ascii')}"
-        alternative = html.escape(_finding(figure) or words)
-        return f'<img alt="{alternative}" width="{round(PIXELS * figure.get_figwidth())}" src="{source}">'
+    def _image(self, figure: Figure, words: str, name: str, pdf: str = "") -> Callable[[], str]:
+        """A figure that is being drawn, as an element of the page, and as files if the report has a folder."""
+        for axes in figure.axes:
+            axes.get_xlim(), axes.get_ylim()  # what they call when they change does not go with them
+        width = round(PIXELS * figure.get_figwidth())
+        drawing = elsewhere(_drawn, figure, bool(pdf))
+        here = None if drawing else _drawn(figure, bool(pdf))
+
+        def image() -> str:
+            drawn = here or drawing()
+            for text in drawn.warnings:
+                warnings.warn(text, UserWarning, stacklevel=2)
+            if self._folder is not None:
+                (self._folder / name).write_bytes(drawn.png)
+                if pdf:
+                    (self._folder / pdf).write_bytes(drawn.pdf)
+            source = f"data:image/png;base64,{base64.b64encode(drawn.png).decode('ascii')}"
+            return f'<img alt="{html.escape(drawn.finding or words)}" width="{width}" src="{source}">'
+
+        return image
 
     def to_html(self, command: str = "") -> str:
         """The page.
@@ -228,6 +252,8 @@ class Report:
         Arguments:
             command: the command that writes this page, for its last lines, which have date and versions.
         """
+        for blocks in (self._sheets, self._blocks, *self._sections):
+            blocks[:] = map(self._settled, blocks)
         links = [f'<a href="#part-{n}">{html.escape(text)}</a>' for n, text in enumerate(self._headings, 1)]
         contents = [f"<nav>{' · '.join(links)}</nav>"] * (len(links) > 1)
         troubles = [_points(list(map(display().words, self.attempts.troubles)))] if self.attempts.troubles else []
@@ -237,11 +263,19 @@ class Report:
         ]
         head = [f"<h1>{html.escape(self.title)}</h1>", *self._sheets, *self._blocks, *contents]
         parts = ["<main>", *head, *sections, *troubles, "</main>", _footer(command)]
-        return _PAGE.format(title=html.escape(self.title), body="\n".join(parts))
+        return _PAGE.format(title=html.escape(self.title), body="\n".join(map(str, parts)))
 
-    def _section(self, number: int, title: str, blocks: Sequence[str]) -> str:
+    def _settled(self, block: "str | _Block") -> str:
+        """A block as text, once its picture is drawn; empty where that failed."""
+        if isinstance(block, str):
+            return block
+        with self.part(block.what):
+            return block.text()
+        return ""
+
+    def _section(self, number: int, title: str, blocks: Sequence[object]) -> str:
         """A section with its heading, folded below a sheet."""
-        heading, body = f'<h2 id="part-{number}">{html.escape(title)}</h2>', "\n".join(blocks)
+        heading, body = f'<h2 id="part-{number}">{html.escape(title)}</h2>', "\n".join(map(str, blocks))
         return f"<details><summary>{heading}</summary>{body}</details>" if self._sheets else f"{heading}\n{body}"
 
     def write(self, path: str | os.PathLike[str], command: str = "") -> Path:
@@ -254,6 +288,27 @@ class Report:
         path = Path(path)
         path.write_text(self.to_html(command), encoding="utf-8")
         return path
+
+
+class _Drawn(NamedTuple):
+    """A picture as files, what its titles say, and what matplotlib warned of."""
+
+    png: bytes
+    pdf: bytes
+    finding: str
+    warnings: list[str]
+
+
+def _drawn(figure: Figure, as_pdf: bool) -> _Drawn:
+    """A figure drawn, as PDF too if it is asked for."""
+    pdf = io.BytesIO()
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", UserWarning)
+        png = _png(figure)
+        if as_pdf:
+            figure.savefig(pdf, format="pdf")
+    texts = [str(warning.message) for warning in caught if warning.category is UserWarning]
+    return _Drawn(png, pdf.getvalue(), _finding(figure), texts)
 
 
 def _png(figure: Figure) -> bytes:
