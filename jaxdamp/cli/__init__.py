@@ -16,7 +16,8 @@ __all__ = ["app", "main"]
 
 def main() -> None:
     """Run the command line as a program of its own; Ctrl-C is answered from the first import on."""
-    gc.set_threshold(100_000, 20, 100)  # imports and traced programs make millions of objects without cycles
+    gc.set_threshold(100_000, 20, 100)  # traced programs make millions of objects without cycles
+    gc.disable()  # until all is imported, which stays
     streams.write_plainly()
     with interrupt.watched(then=signal.SIG_IGN):  # nothing is left to stop while the process ends
         from jaxdamp.cli.application import app

@@ -1,6 +1,7 @@
 """The application: its help and version, and its commands, whose options are made when they are asked for."""
 
 import functools
+import gc
 import inspect
 import itertools
 import shlex
@@ -153,6 +154,9 @@ def command(name: str) -> Command:
             screen = console.Screen()
             arguments = options.build(target, {("screen",): screen, **read})
             perform = getattr(import_module(f"jaxdamp.{module}"), function)
+            if not gc.isenabled():
+                gc.freeze()
+                gc.enable()
             with console.showing(given, screen), noted, console.beside(name):
                 perform(**arguments)
 
