@@ -9,7 +9,9 @@ from jaxtyping import Float
 Samples = Float[np.ndarray, " time"]
 
 
-def smoothing_weights(window: int, order: int, derivative: int = 0) -> Float[np.ndarray, " window"]:
+def smoothing_weights(
+    window: int, order: int, derivative: int = 0, step: float = 1.0
+) -> Float[np.ndarray, " window"]:
     """Weights of the samples of a window, whose sum is the polynomial through them, or a derivative, in its middle.
 
     Savitzky and Golay, Analytical Chemistry 36 (1964); `scipy.signal.savgol_coeffs(..., use="dot")`.
@@ -17,13 +19,16 @@ def smoothing_weights(window: int, order: int, derivative: int = 0) -> Float[np.
     Arguments:
         window: number of samples, odd.
         order: of the polynomial.
-        derivative: which one, for a step of one.
+        derivative: which one.
+        step: between the samples.
     """
     half = window // 2
-    powers = np.vander(np.arange(-half, half + 1.0) / max(half, 1), order + 1, increasing=True)
+    powers = np.arange(-half, half + 1.0) ** np.arange(order + 1.0)[:, None]
     wanted = np.zeros(order + 1)
-    wanted[derivative] = math.factorial(derivative) / max(half, 1) ** derivative
-    return np.linalg.lstsq(powers.T, wanted, rcond=None)[0]
+    wanted[derivative] = math.factorial(derivative) / step**derivative
+    weights = np.linalg.lstsq(powers, wanted, rcond=np.finfo(float).eps)[0]
+    weights[half + 1 :] = (-1.0) ** derivative * weights[:half][::-1]  # which rounding errors break
+    return weights
 
 
 def smoothed(values: Samples, window: int, order: int, derivative: int = 0, step: float = 1.0) -> Samples:
@@ -38,14 +43,13 @@ def smoothed(values: Samples, window: int, order: int, derivative: int = 0, step
         derivative: which one.
         step: between the instants.
     """
-    half = window // 2
-    middle = np.convolve(values, smoothing_weights(window, order, derivative)[::-1], "valid")
-    places = np.arange(-half, half + 1.0) / max(half, 1)
+    half, places = window // 2, np.arange(0.0, window)
+    middle = np.convolve(values, smoothing_weights(window, order, derivative, step)[::-1], "valid")
     ends = []
     for part, wanted in ((values[:window], places[:half]), (values[-window:], places[half + 1 :])):
-        curve = np.polynomial.Polynomial.fit(places, part, order, domain=[-1.0, 1.0]).deriv(derivative)
-        ends.append(curve(wanted) / max(half, 1) ** derivative)
-    return np.concatenate([ends[0], middle, ends[1]]) / step**derivative
+        curve = np.polyder(np.polyfit(places, part, order), derivative)
+        ends.append(np.polyval(curve, wanted) / step**derivative)
+    return np.concatenate([ends[0], middle, ends[1]])
 
 
 def decaying(values: Float[np.ndarray, "time ..."], decay: float) -> Float[np.ndarray, "time ..."]:
