@@ -9,9 +9,7 @@ from jaxtyping import Float
 Samples = Float[np.ndarray, " time"]
 
 
-def smoothing_weights(
-    window: int, order: int, derivative: int = 0, step: float = 1.0
-) -> Float[np.ndarray, " window"]:
+def smoothing_weights(window: int, order: int, derivative: int = 0, step: float = 1.0) -> Float[np.ndarray, " window"]:
     """Weights of the samples of a window, whose sum is the polynomial through them, or a derivative, in its middle.
 
     Savitzky and Golay, Analytical Chemistry 36 (1964); `scipy.signal.savgol_coeffs(..., use="dot")`.

@@ -83,12 +83,14 @@ class Process:
         return bool(select.select([self._ends], [], [], 0.0)[0])
 
     def end(self) -> None:
-        """Ask it to end when it is done, and wait for that."""
+        """End it, and wait for that; what it still computes is not wanted."""
         try:
-            self._ends.shutdown(socket.SHUT_WR)
+            self._ends.shutdown(socket.SHUT_RDWR)
         except OSError:
             pass  # it has ended
+        os.kill(self.pid, signal.SIGTERM)  # until it is waited for, the number is its own
         os.waitpid(self.pid, 0)
+        self._stream.close()
         self._ends.close()
 
 
@@ -273,6 +275,7 @@ def _forked(prepare: Callable[[], object]) -> Process:
         _serve(there.makefile("rwb"), prepare)
         code = 0
     finally:  # never back into the command
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
         atexit._run_exitfuncs()
         sys.stdout.flush()
         sys.stderr.flush()
@@ -285,7 +288,7 @@ def _serve(stream: BinaryIO, prepare: Callable[[], object]) -> None:
 
     signal.set_wakeup_fd(-1)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C of a terminal goes to both: the other side decides
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit())
     ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL)
     jax.config.update("jax_platforms", "cpu")  # a GPU is the other side's
     prepare()
@@ -294,13 +297,16 @@ def _serve(stream: BinaryIO, prepare: Callable[[], object]) -> None:
         try:
             known += _read(stream, ())
             function, arguments = _read(stream, known)
-        except EOFError:
+        except (EOFError, OSError):
             return
         try:
             answer = _pickled((True, function(*arguments)), known)
         except Exception as error:
             answer = _raised(error)
-        _send(stream, answer)
+        try:
+            _send(stream, answer)
+        except OSError:
+            return
 
 
 def _raised(error: Exception) -> bytes:

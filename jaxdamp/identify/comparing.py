@@ -8,7 +8,7 @@ from typing import Any, ClassVar, ParamSpec, Protocol, cast, overload, runtime_c
 from jaxdamp._pieces import piece
 from jaxdamp._progress import Progress
 from jaxdamp._results import plotted
-from jaxdamp._second_process import anywhere
+from jaxdamp._second_process import anywhere, elsewhere
 from jaxdamp._tables import Contents, Table, with_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Figure
@@ -219,27 +219,42 @@ def fit_each(
     naming = any(named.get(option) for option in NAMED)
     known = {name: _paths(law, runs, rig) for name, law in laws.items()} if naming else {}
 
-    def fitted(name: str, start: Start, held: tuple[str, ...] = ()) -> Rung | Failure:
+    sent = (*runs, *held_out)
+
+    def given(name: str, start: Start, held: tuple[str, ...] = ()) -> tuple[Any, ...]:
         own = naming_only(named, _paths(start, runs, rig), known.values()) if known else named
         own = {**own, "rig": rig, "freeze": (*own["freeze"], *held)}
-        given = (name, start, tuple(runs), tuple(held_out), scheduled, own)
+        return name, start, tuple(runs), tuple(held_out), scheduled, own
 
-        def compute() -> Rung | Failure:
-            result, printed = anywhere(WithPrinted(_outcome), *given, shared=(*runs, *held_out))
+    def kept(inputs: tuple[Any, ...], compute: Callable[[], tuple[Rung | Failure, Any]]) -> Rung | Failure:
+        def outcome() -> Rung | Failure:
+            result, printed = compute()
             remember(printed)
             return result
 
-        return piece(("law", *given), compute)
+        return piece(("law", *inputs), outcome)
+
+    def fitted(name: str, start: Start, held: tuple[str, ...] = ()) -> Rung | Failure:
+        inputs = given(name, start, held)
+        return kept(inputs, lambda: anywhere(WithPrinted(_outcome), *inputs, shared=sent))
+
+    def held_with(source: Rung, held: tuple[str, ...]) -> tuple[str, ...]:
+        return *frozen_by(laws[source.name]), *held
 
     def simpler(source: Rung, law: AbstractDamper, held: tuple[str, ...]) -> Rung | Failure:
-        return fitted(source.name, law, (*frozen_by(laws[source.name]), *held))
+        return fitted(source.name, law, held_with(source, held))
+
+    def ahead(source: Rung, law: AbstractDamper, held: tuple[str, ...]) -> Callable[[], Rung | Failure] | None:
+        inputs = given(source.name, law, held_with(source, held))
+        waiting = elsewhere(WithPrinted(_outcome), *inputs, shared=sent)
+        return None if waiting is None else lambda: kept(inputs, waiting)
 
     rungs = list[Rung]()
     for one in side_by_side(fitted, laws, progress):
         rungs += [one] if isinstance(one, Rung) else []
         yield one
     if rungs and not scheduled:
-        yield from reduced(rungs, simpler, progress)
+        yield from reduced(rungs, simpler, progress, ahead)
 
 
 def _outcome(

@@ -4,8 +4,9 @@ import dataclasses
 import functools
 import os
 from abc import abstractmethod
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import ClassVar, Generic, TypeVar, cast
 
 import jax
@@ -148,15 +149,33 @@ def side_by_side(
         with jax.enable_x64(double):
             return fitted(name, start)
 
-    most = 1 + _second_process.count() if _second_process.count() else min(os.cpu_count() or 1, MOST_THREADS)
-    pool = ThreadPoolExecutor(max_workers=most)
+    beside = _second_process.count()
+    count = 1 + beside if beside else min(os.cpu_count() or 1, MOST_THREADS)
+    outcomes = {name: Future[Outcome]() for name in starts}
+    left = deque(starts)
+
+    def work(number: int) -> None:
+        """The first thread begins with the simplest, whose results come first, others with what takes longest."""
+        while left:
+            try:
+                name = left.pop() if number and beside else left.popleft()
+            except IndexError:
+                return
+            try:
+                outcomes[name].set_result(in_precision(name, starts[name]))
+            except BaseException as error:
+                outcomes[name].set_exception(error)
+
+    pool = ThreadPoolExecutor(max_workers=count)
     try:
-        waiting = {name: pool.submit(in_precision, name, start) for name, start in starts.items()}
-        for name, outcome in waiting.items():
+        for number in range(count):
+            pool.submit(work, number)
+        for name, outcome in outcomes.items():
             progress(name)
             yield outcome.result()
     finally:
-        pool.shutdown(cancel_futures=True)
+        left.clear()
+        pool.shutdown()
 
 
 def naming_only(options: Mapping[str, V], own: Sequence[str], every: Iterable[Sequence[str]]) -> dict[str, V]:

@@ -25,6 +25,8 @@ LOSS = 1.02  # times the error of the whole law: what is not determined is hardl
 MOST_LAWS = 2  # that are to become simpler
 
 Fitted = Callable[[Rung, AbstractDamper, tuple[str, ...]], Rung | Failure]
+Begun = Callable[[], Rung | Failure]
+Ahead = Callable[[Rung, AbstractDamper, tuple[str, ...]], Begun | None]
 
 
 class Simpler(NamedTuple):
@@ -129,7 +131,13 @@ def held_of(law: AbstractDamper, fastest: float) -> tuple[str, ...]:
     return *zero, *(place + name for place, part in laws_inside(law) for name in part.without_effect(fastest))
 
 
-def reduced(rungs: Sequence[Rung], fitted: Fitted, progress: Callable[[str], None]) -> Iterator[Rung]:
+def nothing_ahead(source: Rung, law: AbstractDamper, held: tuple[str, ...]) -> None:
+    """One fit after the other."""
+
+
+def reduced(
+    rungs: Sequence[Rung], fitted: Fitted, progress: Callable[[str], None], ahead: Ahead = nothing_ahead
+) -> Iterator[Rung]:
     """A law all of whose numbers are determined, in place of one recommended in spite of doubt or left aside for it.
 
     Parts with undetermined numbers are left out one after the other, while the error on motion held out stays within
@@ -141,6 +149,7 @@ def reduced(rungs: Sequence[Rung], fitted: Fitted, progress: Callable[[str], Non
         rungs: the laws.
         fitted: fits and judges a law made simpler from a rung, with numbers to be held.
         progress: called with the name of each law that is made simpler.
+        ahead: begins, beside a fit, the one that follows if this one does not predict as well; None where it cannot.
     """
     best = recommendation(rungs).rung
     judged = sorted(judged_on_held_out(rungs), key=lambda rung: rung.error)
@@ -152,22 +161,27 @@ def reduced(rungs: Sequence[Rung], fitted: Fitted, progress: Callable[[str], Non
     for source in sources[:MOST_LAWS]:
         progress(source.name)
         as_well = max(min(near, LOSS * source.error), floor)
-        rung = _without_doubt(source, as_well, max(near, floor) if best.doubt else as_well, fitted)
+        rung = _without_doubt(source, as_well, max(near, floor) if best.doubt else as_well, fitted, ahead)
         found += [rung] if rung else []
         if rung and rung.error <= as_well:
             break
     yield from sorted(found, key=lambda rung: rung.error)[:1]
 
 
-def _without_doubt(source: Rung, enough: float, most: float, fitted: Fitted) -> Rung | None:
+def _without_doubt(source: Rung, enough: float, most: float, fitted: Fitted, ahead: Ahead) -> Rung | None:
     """The law with less in it, all of whose numbers are determined, if one predicts as well or nearly as well."""
     at, left_out, failed, nearly = source, list[str](), set[str](), None
+    begun: dict[tuple[str, ...], Begun | None] = {}  # by what is left out
     while at.doubt and len(failed) < MOST_FAILURES:
         law, weak, fastest = _doubtful(at)
         options = [part for part in simpler_laws(law, weak, fastest) if part.words not in failed]
         if options:
-            part = max(options, key=lambda part: (part.share, part.weak))
-            rung = _fitted_with_less(source, part.law, fastest, fitted)
+            part, *others = sorted(options, key=lambda part: (part.share, part.weak), reverse=True)
+            for other in others[: len(failed) < MOST_FAILURES - 1]:
+                following = (*left_out, other.words)
+                begun[following] = begun.get(following) or ahead(source, *_with_held(other.law, fastest))
+            known = begun.get((*left_out, part.words))
+            rung = _fitted_with_less(source, part.law, fastest, _as_begun(known) if known else fitted)
             if rung and not rung.doubt and rung.error <= most:
                 nearly, most = rung, rung.error
             if rung and rung.error <= enough:
@@ -181,10 +195,13 @@ def _without_doubt(source: Rung, enough: float, most: float, fitted: Fitted) -> 
     return nearly
 
 
+def _as_begun(begun: Begun) -> Fitted:
+    return lambda source, law, held: begun()
+
+
 def _fitted_with_less(source: Rung, law: AbstractDamper, fastest: float, fitted: Fitted) -> Rung | None:
     """The fit of a law with less in it, which says what it is, and that no record determines what is held."""
-    law = without_zero_terms(law)
-    held = held_of(law, fastest)
+    law, held = _with_held(law, fastest)
     rung = fitted(source, law, held)
     if isinstance(rung, Failure):
         return None
@@ -196,6 +213,12 @@ def _fitted_with_less(source: Rung, law: AbstractDamper, fastest: float, fitted:
     law = with_standard_errors(law, [*law.standard_errors, *unknown])
     result = dataclasses.replace(rung.result, law=law)
     return rung._replace(name=f"{source.name}_reduced", result=result, held=held, reduced=reduced)
+
+
+def _with_held(law: AbstractDamper, fastest: float) -> tuple[AbstractDamper, tuple[str, ...]]:
+    """A law to be fitted, and the numbers of it that are held."""
+    law = without_zero_terms(law)
+    return law, held_of(law, fastest)
 
 
 def without_zero_terms(law: AbstractDamper) -> AbstractDamper:
