@@ -20,13 +20,13 @@ def smoothing_weights(window: int, order: int, derivative: int = 0, step: float 
         derivative: which one.
         step: between the samples.
     """
+    from scipy.linalg import lstsq
+
     half = window // 2
-    powers = np.arange(-half, half + 1.0) ** np.arange(order + 1.0)[:, None]
+    powers = np.arange(half, -half - 1.0, -1.0) ** np.arange(order + 1.0)[:, None]
     wanted = np.zeros(order + 1)
     wanted[derivative] = math.factorial(derivative) / step**derivative
-    weights = np.linalg.lstsq(powers, wanted, rcond=np.finfo(float).eps)[0]
-    weights[half + 1 :] = (-1.0) ** derivative * weights[:half][::-1]  # which rounding errors break
-    return weights
+    return lstsq(powers, wanted)[0][::-1]  # pyright: ignore[reportOptionalSubscript]
 
 
 def smoothed(values: Samples, window: int, order: int, derivative: int = 0, step: float = 1.0) -> Samples:
@@ -41,13 +41,15 @@ def smoothed(values: Samples, window: int, order: int, derivative: int = 0, step
         derivative: which one.
         step: between the instants.
     """
+    from scipy.ndimage import correlate1d
+
     half, places = window // 2, np.arange(0.0, window)
-    middle = np.convolve(values, smoothing_weights(window, order, derivative, step)[::-1], "valid")
+    whole = correlate1d(values, smoothing_weights(window, order, derivative, step), mode="constant")
     ends = []
     for part, wanted in ((values[:window], places[:half]), (values[-window:], places[half + 1 :])):
         curve = np.polyder(np.polyfit(places, part, order), derivative)
         ends.append(np.polyval(curve, wanted) / step**derivative)
-    return np.concatenate([ends[0], middle, ends[1]])
+    return np.concatenate([ends[0], whole[half : whole.size - half], ends[1]])
 
 
 def decaying(values: Float[np.ndarray, "time ..."], decay: float) -> Float[np.ndarray, "time ..."]:
