@@ -18,7 +18,7 @@ import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, BinaryIO, Generic, TypeVar
+from typing import IO, Any, Generic, TypeVar
 
 from jaxdamp._forked import started
 
@@ -97,7 +97,7 @@ class Process:
 class _Shared(pickle.Pickler):
     """Objects that both sides have are written as their numbers."""
 
-    def __init__(self, stream: BinaryIO, known: Sequence[object]) -> None:
+    def __init__(self, stream: IO[bytes], known: Sequence[object]) -> None:
         super().__init__(stream, protocol=pickle.HIGHEST_PROTOCOL)
         self._numbers = {id(thing): number for number, thing in enumerate(known)}
 
@@ -107,7 +107,7 @@ class _Shared(pickle.Pickler):
 
 
 class _Known(pickle.Unpickler):
-    def __init__(self, stream: BinaryIO, known: Sequence[object]) -> None:
+    def __init__(self, stream: IO[bytes], known: Sequence[object]) -> None:
         super().__init__(stream)
         self._things = known
 
@@ -122,12 +122,12 @@ def _pickled(thing: object, known: Sequence[object]) -> bytes:
     return stream.getvalue()
 
 
-def _send(stream: BinaryIO, content: bytes) -> None:
+def _send(stream: io.BufferedRWPair, content: bytes) -> None:
     stream.write(len(content).to_bytes(8, "little") + content)
     stream.flush()
 
 
-def _read(stream: BinaryIO, known: Sequence[object]) -> Any:
+def _read(stream: io.BufferedRWPair, known: Sequence[object]) -> Any:
     length = stream.read(8)
     content = stream.read(int.from_bytes(length, "little"))
     if len(length) < 8:
@@ -253,7 +253,8 @@ def opened(prepare: Callable[[], object]) -> Iterator[None]:
         yield
     finally:
         ending = [*_all]
-        _free.clear(), _all.clear(), _begun_elsewhere.clear()
+        for each in (_free, _all, _begun_elsewhere):
+            each.clear()
         for process in ending:
             process.end()
 
@@ -282,7 +283,7 @@ def _forked(prepare: Callable[[], object]) -> Process:
         os._exit(code)
 
 
-def _serve(stream: BinaryIO, prepare: Callable[[], object]) -> None:
+def _serve(stream: io.BufferedRWPair, prepare: Callable[[], object]) -> None:
     """Compute what comes, until the other side ends."""
     import jax
 

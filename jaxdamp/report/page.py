@@ -228,13 +228,11 @@ class Report:
     def _image(self, figure: Figure, words: str, name: str, pdf: str = "") -> Callable[[], str]:
         """A figure that is being drawn, as an element of the page, and as files if the report has a folder."""
         for axes in figure.axes:
-            axes.get_xlim(), axes.get_ylim()  # what they call when they change does not go with them
+            _ = axes.get_xlim(), axes.get_ylim()  # what they call when they change does not go with them
         width = round(PIXELS * figure.get_figwidth())
         drawing = elsewhere(_drawn, figure, bool(pdf))
-        here = None if drawing else _drawn(figure, bool(pdf))
 
-        def image() -> str:
-            drawn = here or drawing()
+        def image(drawn: _Drawn) -> str:
             for text in drawn.warnings:
                 warnings.warn(text, UserWarning, stacklevel=2)
             if self._folder is not None:
@@ -244,7 +242,10 @@ class Report:
             source = f"data:image/png;base64,{base64.b64encode(drawn.png).decode('ascii')}"
             return f'<img alt="{html.escape(drawn.finding or words)}" width="{width}" src="{source}">'
 
-        return image
+        if drawing is not None:
+            return lambda: image(drawing())
+        text = image(_drawn(figure, bool(pdf)))
+        return lambda: text
 
     def to_html(self, command: str = "") -> str:
         """The page.
