@@ -18,13 +18,14 @@ import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import IO, Any, Generic, TypeVar
+from typing import IO, Generic, TypeAlias, TypeVar, cast
 
 from jaxdamp._forked import started
 
 
 T = TypeVar("T")
 MOST = 4  # processes, this one too
+_Call: TypeAlias = tuple[Callable[..., object], tuple[object, ...]]
 UNPICKLED = (pickle.PicklingError, AttributeError, TypeError)
 DIE_WITH_PARENT = 1  # of Linux: `PR_SET_PDEATHSIG`
 
@@ -67,14 +68,14 @@ class Process:
         except OSError:
             pass  # it has ended, which `result` says
 
-    def result(self) -> tuple[bool, Any]:
+    def result(self) -> tuple[bool, object]:
         """Whether the function raised nothing, and its result or what it raised.
 
         Raises:
             Lost: the process has ended.
         """
         try:
-            return _read(self._stream, self._known)
+            return cast(tuple[bool, object], _read(self._stream, self._known))
         except (EOFError, OSError) as error:
             raise Lost(str(error)) from error
 
@@ -127,7 +128,7 @@ def _send(stream: io.BufferedRWPair, content: bytes) -> None:
     stream.flush()
 
 
-def _read(stream: io.BufferedRWPair, known: Sequence[object]) -> Any:
+def _read(stream: io.BufferedRWPair, known: Sequence[object]) -> object:
     length = stream.read(8)
     content = stream.read(int.from_bytes(length, "little"))
     if len(length) < 8:
@@ -151,7 +152,7 @@ class Waiting(Generic[T]):
 
     def __init__(self, process: Process, compute: Callable[[], T]) -> None:
         self._process, self._compute = process, compute
-        self._answer: tuple[bool, Any] | None = None
+        self._answer: tuple[bool, object] | None = None
 
     def __call__(self) -> T:
         """The result, once it is there; what the function raised is raised."""
@@ -159,8 +160,8 @@ class Waiting(Generic[T]):
         assert self._answer is not None
         sound, result = self._answer
         if sound:
-            return result
-        raise result
+            return cast(T, result)
+        raise cast(Exception, result)
 
     def settle(self, *, if_ready: bool = False) -> None:
         """Read the result, so that the process is free; it is computed here where the process has ended."""
@@ -296,8 +297,8 @@ def _serve(stream: io.BufferedRWPair, prepare: Callable[[], object]) -> None:
     known: list[object] = []
     while True:
         try:
-            known += _read(stream, ())
-            function, arguments = _read(stream, known)
+            known += cast(list[object], _read(stream, ()))
+            function, arguments = cast(_Call, _read(stream, known))
         except (EOFError, OSError):
             return
         try:

@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, ClassVar, ParamSpec, Protocol, cast, overload, runtime_checkable
+from typing import Any, ClassVar, ParamSpec, Protocol, TypeAlias, cast, overload, runtime_checkable
 
 from jaxdamp._pieces import piece
 from jaxdamp._progress import Progress
@@ -20,7 +20,7 @@ from jaxdamp.identify.held_out import HeldOut, on_records, without_parts
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import OFFSET, Machine, absent_paths, started_machine
 from jaxdamp.identify.model import on_rig
-from jaxdamp.identify.printed_law import WithPrinted, remember
+from jaxdamp.identify.printed_law import PrintedLaw, WithPrinted, remember
 from jaxdamp.identify.reducing import reduced
 from jaxdamp.identify.rungs import Failure, Rung, ladder_table, verdict
 from jaxdamp.identify.scheduling import fit_scheduled, settings_stated
@@ -31,6 +31,7 @@ from jaxdamp.vehicles import AbstractVehicle
 
 
 P = ParamSpec("P")
+Computed: TypeAlias = tuple[Rung | Failure, list[PrintedLaw]]
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -221,12 +222,14 @@ def fit_each(
 
     sent = (*runs, *held_out)
 
-    def given(name: str, start: Start, held: tuple[str, ...] = ()) -> tuple[Any, ...]:
+    def given(name: str, start: Start, held: tuple[str, ...] = ()) -> tuple[object, ...]:
         own = naming_only(named, _paths(start, runs, rig), known.values()) if known else named
         own = {**own, "rig": rig, "freeze": (*own["freeze"], *held)}
         return name, start, tuple(runs), tuple(held_out), scheduled, own
 
-    def kept(inputs: tuple[Any, ...], compute: Callable[[], tuple[Rung | Failure, Any]]) -> Rung | Failure:
+    def kept(
+        inputs: tuple[object, ...], compute: Callable[[], tuple[Rung | Failure, list[PrintedLaw]]]
+    ) -> Rung | Failure:
         def outcome() -> Rung | Failure:
             result, printed = compute()
             remember(printed)

@@ -1,11 +1,12 @@
 """The C functions of a law on a machine: its force, the step of its states, and what they are differentiated by."""
 
 import ctypes
+import dataclasses
 import functools
 import logging
 import threading
 from collections.abc import Callable, Hashable, Sequence
-from typing import Any, NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import jax
 import numpy as np
@@ -18,6 +19,7 @@ from jaxdamp.identify.printed_records import MachineNumbers, MachinePlaces, Reco
 from jaxdamp.rig import LawNumbers, Rig, gas_and_friction, numbers_of
 
 
+T = TypeVar("T")
 _LOG = logging.getLogger("jaxdamp.identify.printed")
 LANES = 4  # derivatives side by side, of which there is a whole number
 _HEAD = """#include <math.h>
@@ -229,12 +231,13 @@ def printed_law(numbers: LawNumbers, free: set[int] | None) -> PrintedLaw | None
         return law
 
 
-class WithPrinted(NamedTuple):
+@dataclasses.dataclass(frozen=True)
+class WithPrinted(Generic[T]):
     """A function whose result comes with the laws that were printed for it, for `remember` in another process."""
 
-    function: Callable[..., Any]
+    function: Callable[..., T]
 
-    def __call__(self, *arguments: object) -> tuple[Any, list[PrintedLaw]]:
+    def __call__(self, *arguments: object) -> tuple[T, list[PrintedLaw]]:
         """The result, and the laws."""
         before = set(map(id, _printed()))
         result = self.function(*arguments)
