@@ -64,7 +64,8 @@ def cost(script: str, cache: str) -> tuple[float, float, str]:
         raise RuntimeError(done.stderr)
     wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
     used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return wall, used, done.stderr.rpartition("programs: ")[2].strip() if "programs: " in done.stderr else ""
+    counted = [int(part.split()[0]) for part in done.stderr.split("programs: ")[1:]]  # of each of its processes
+    return wall, used, str(sum(counted)) if counted else ""
 
 
 def seconds(script: str) -> float:
