@@ -35,10 +35,10 @@ with second.opened(lambda: None):
     else:
         raise AssertionError("an error is raised here")
     assert second.elsewhere(lambda: 1) is None, "what cannot be sent is not begun"
-    begun = threading.Event()
+    begun, enough = threading.Event(), threading.Event()
     def busy():
         begun.set()
-        time.sleep(0.2)
+        enough.wait()
     thread = threading.Thread(target=second.anywhere, args=(busy,))
     thread.start()
     begun.wait()
@@ -46,6 +46,7 @@ with second.opened(lambda: None):
     assert second.anywhere(lambda: os.getpid()) == parent, "what cannot be sent is computed here"
     assert second.anywhere(ends) == parent, "what a process that ended has left is computed here"
     assert second.anywhere(where)[0] == parent
+    enough.set()
     thread.join()
 with second.opened(lambda: None):
     second.elsewhere(time.sleep, 60.0)  # nobody waits for it
