@@ -1,6 +1,7 @@
 """The body of a loop over steps as C for many points side by side."""
 
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from importlib import resources
 from typing import NamedTuple, TypeGuard, final
 
@@ -36,6 +37,7 @@ _LIMITS = {"min": "{1} < {0} ? {1} : {0}", "max": "{1} > {0} ? {1} : {0}"}
 _NAN = constant(np.nan, "float64")
 _SPOILT = ("for (int i = 0; i < STATE; i++)", "    state[i][lane] += missing;")
 WIDTH = 16  # of the printed block in the template
+_VECTORS = "abcd"  # of a block that a step takes in turn, operation by operation: each waits for its own last result
 
 
 @final
@@ -60,7 +62,7 @@ class Loop(NamedTuple):
         if not self.straight:
             message = "A loop or a branch inside a step cannot be printed for many points side by side."
             raise NotImplementedError(message)
-        return _filled("lanes.c", self.parts)
+        return _filled("lanes.c", self.parts | {"of_both": list(_in_turn(self.parts["of_both"]))})
 
     @property
     def kernel(self) -> str:
@@ -175,7 +177,7 @@ def _parts(
     if _is_straight(statements):
         repeated, carried, straight = _with_kept(statements, levels, carried)
         inside = {name for name, level in levels.items() if level == OF_BOTH}
-        straight = sums_of_products(straight, inside, carried.values())
+        straight = sums_of_products(straight, inside, carried)
         straight, limits = _limited(straight, levels)
         statements = [*straight]
     parts: dict[int, list[Statement]] = {level: [] for level in range(4)}
@@ -275,6 +277,15 @@ def _assigned(pairs: list[tuple[str, str]], *, now: bool) -> list[str]:
     pairs = [pair for pair in pairs if pair[0].startswith("now") == now]
     copies = [f"const double after{i} = {value};" for i, (_, value) in enumerate(pairs)]
     return copies + [f"{target} = after{i};" for i, (target, _) in enumerate(pairs)]
+
+
+def _in_turn(lines: Iterable[str]) -> Iterator[str]:
+    """Each line for one vector after the other, with names of its own for what it defines."""
+    lines = list(lines)
+    own = {"lane", *(name for line in lines for name in re.findall(r"^ *const \w+ (\w+)", line))}
+    for line in lines:
+        for vector in _VECTORS:
+            yield re.sub(r"[A-Za-z]\w*", lambda word, v=vector: word[0] + v * (word[0] in own), line)
 
 
 def _filled(template: str, marks: dict[str, str | list[str]]) -> str:

@@ -31,7 +31,7 @@ def printed_scan(
         step: of numbers and small arrays in double precision; loops and branches inside it run on GPUs only.
         carry: a tree of arrays.
         rows: a tree of arrays, one row for each step along the first axis.
-        arithmetic: refuse a step with functions such as exponentials, which are faster in XLA.
+        arithmetic: refuse a step with functions such as exponentials, which are faster in XLA on processors.
 
     Raises:
         NotImplementedError: what cannot be printed, other types than float64, no C compiler, for GPUs no NVRTC,
@@ -42,7 +42,7 @@ def printed_scan(
     with printing():
         body, constants = with_constants_as_inputs(step, (carry, row))
     start, tree = jax.tree.flatten(carry)
-    scan = _Scan(body, [known(value) for value in constants], arithmetic)
+    scan = _Scan(body, [known(value) for value in constants], arithmetic and not on_gpu())
     traced = [c for c, value in zip(constants, scan.values, strict=True) if value is None]
     for leaf in [*traced, *start, *jax.tree.leaves(rows)]:
         if leaf.dtype != jnp.float64:

@@ -5,6 +5,11 @@
 #include "call.h"
 
 #define LANES 32 /* points of a block, which the compiler turns into vectors */
+#ifdef __AVX512F__
+#define VECTOR 8
+#else
+#define VECTOR 4
+#endif
 #define ROW(name, count) double name[(count) ? (count) : 1][LANES] __attribute__((aligned(64)))
 
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
@@ -57,10 +62,12 @@ static void run(const double *restrict shared, const double *restrict own_in, co
             const double *restrict row = rows + step * ROWS;
             (void)row;
 @of_step@
+            for (int base = 0; base < LANES; base += 4 * VECTOR)
 #pragma omp simd
-            for (int lane = 0; lane < LANES; lane++) {
+                for (int lanea = base; lanea < base + VECTOR; lanea++) {
+                    const int laneb = lanea + VECTOR, lanec = laneb + VECTOR, laned = lanec + VECTOR;
 @of_both@
-            }
+                }
 @next@
         }
         for (int i = 0; i < STATE; i++)

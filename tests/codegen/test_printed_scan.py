@@ -199,7 +199,8 @@ def test_refused_by_name(monkeypatch):
     with pytest.raises(NotImplementedError, match="rows of a loop"):
         jax.vmap(lambda rows: printed_scan(lambda c, row: c + row[0], jnp.asarray(0.0), rows))(jnp.ones((3, 5, 1)))
     with monkeypatch.context() as patched, pytest.raises(NotImplementedError, match=r"loaded here .* TMPDIR"):
-        patched.setattr(_native, "_folder", lambda: Path("/nowhere"))
+        for folder in ("_lasting_folder", "_folder"):
+            patched.setattr(_native, folder, lambda: Path("/nowhere"))
         run(lambda c, row, x: c + 0.321 * row[0] * x, jnp.asarray(0.0))
     monkeypatch.setattr(_native, "compiler", lambda: None)
     with pytest.raises(NotImplementedError, match="No C compiler"):
@@ -217,9 +218,10 @@ def test_a_sweep_of_all_ride_metrics():
         np.testing.assert_allclose(printed[name], plain[name], rtol=1e-11, atol=1e-14, err_msg=str(name))
 
 
-def test_a_long_sweep_tries_the_printed_loop_too(monkeypatch):
+def test_a_sweep_prints_its_loop_and_a_long_one_compares(monkeypatch):
     """With the numbers of XLA, which does all where derivatives, functions or a missing compiler stand in the way."""
-    ride = Ride(CAR, ROAD, metrics=["rms_sprung_acceleration"], duration=0.4)
+    metric = "rms_sprung_acceleration"
+    ride = Ride(CAR, ROAD, metrics=[metric], duration=0.4)
     tried, original = [], running._Pace
 
     class Slow(original):
@@ -231,29 +233,34 @@ def test_a_long_sweep_tries_the_printed_loop_too(monkeypatch):
     def swept(function=ride, **options):
         tried.clear()
         data = sweep(function, {RATE: np.linspace(2e3, 5e3, 20)}, chunk=1, **options)
-        return data, len(tried)
+        return data, len(tried), data.attrs["loop"]
 
-    plain, programs = swept()
-    assert (programs, plain.attrs["loop"]) == (1, "compiled by XLA")  # too short
+    by_xla = Ride(CAR, ROAD, metrics=[metric], duration=0.4, engine=Exponential(printed=False))
+    plain = swept(by_xla)[0]
+    printed, *what = swept()
+    assert what == [1, "printed as C"]
+    np.testing.assert_allclose(printed[metric], plain[metric], rtol=1e-12)
     monkeypatch.setattr(running, "LONG", 0.0)
     monkeypatch.setattr(running, "TURNS", 1)
-    found, programs = swept()
-    assert programs == 2
-    metric = "rms_sprung_acceleration"
-    np.testing.assert_allclose(found[metric], plain[metric], rtol=1e-12)
+    assert swept()[1] == 2
     made = iter((Slow, original))
     with monkeypatch.context() as patched:
         patched.setattr(running, "_Pace", lambda program: next(made)(program))
-        found = swept()[0]
-    assert found.attrs["loop"] == "printed as C"
-    np.testing.assert_allclose(found[metric], plain[metric], rtol=1e-12)
-    powers = vehicles.presets.quarter_car_000(CAR.damper + PowerLaw(1800.0, 0.55, 900.0, 0.55))
-    by_xla = Ride(CAR, ROAD, metrics=[metric], duration=0.4, engine=Exponential(printed=False))
-    assert swept(gradients=True)[1] == swept(by_xla)[1] == 1
-    ride_of_powers = Ride(powers, ROAD, metrics=[metric], duration=0.4)
-    assert len(sweep(ride_of_powers, {"sprung_mass": np.linspace(250.0, 300.0, 9)}, chunk=1)) and len(tried) == 2
+        compared, _, loop = swept()
+    assert loop == "compiled by XLA"
+    np.testing.assert_allclose(compared[metric], plain[metric], rtol=1e-12)
+    powers = Ride(
+        vehicles.presets.quarter_car_000(CAR.damper + PowerLaw(1800.0, 0.55, 900.0, 0.55)),
+        ROAD,
+        metrics=[metric],
+        duration=0.4,
+    )
+    xla = [1, "compiled by XLA"]
+    assert [*swept(gradients=True)[1:]] == [*swept(by_xla)[1:]] == xla
+    data = sweep(powers, {"sprung_mass": np.linspace(250.0, 300.0, 9)}, chunk=1)
+    assert data.attrs["loop"] == xla[1]
     monkeypatch.setattr("jaxdamp.simulation.ride.compiler", lambda: None)
-    assert swept()[1] == 1
+    assert [*swept()[1:]] == xla
 
 
 def test_runs_that_cannot_be_printed():
