@@ -11,7 +11,7 @@ import jax
 from jaxdamp import _checks
 from jaxdamp._files import cache_home
 from jaxdamp._forked import started
-from jaxdamp.codegen import is_printing
+from jaxdamp.codegen import is_printing, is_printing_vectors
 
 
 # A loop whose body touches fewer bytes than the threshold is compiled as one function; XLA's own threshold is 1 kB.
@@ -95,30 +95,32 @@ class Target(NamedTuple):
     Attributes:
         fused_loops: XLA compiles loops over time as one function.
         reciprocal_roots: the device has an instruction for many 1/√x at a time (AVX-512); XLA then starts from it.
-        library_functions: exponentials, logarithms and powers are those of the compiler's own library, one number at a
-            time: fastest for one car, and in printed C (`jaxdamp.codegen`).
+        library_functions: exponentials and logarithms are those of the compiler's own library, one number at a time:
+            fastest for one car, and in printed C (`jaxdamp.codegen`).
+        library_powers: powers too; of many cars side by side they are exponentials of logarithms.
     """
 
     fused_loops: bool
     reciprocal_roots: bool
     library_functions: bool = False
+    library_powers: bool = False
 
 
 # One car on a processor of any kind, with the elementary functions of the C library.
-_PRINTED = Target(fused_loops=False, reciprocal_roots=False, library_functions=True)
+_PRINTED = Target(fused_loops=False, reciprocal_roots=False, library_functions=True, library_powers=True)
 # Part of the key of compiled functions: what was traced for one target is not taken for another.
 _OTHER_TARGET = jax.make_user_context(None)
 
 
 def one_at_a_time() -> AbstractContextManager[None]:
     """Functions traced inside are for one car: they take the library's elementary functions."""
-    return _OTHER_TARGET(target()._replace(library_functions=True))
+    return _OTHER_TARGET(target()._replace(library_functions=True, library_powers=True))
 
 
 def target() -> Target:
     """What the function that is being traced is compiled for; by default this process, see `_this_process`."""
     if is_printing():
-        return _PRINTED
+        return _PRINTED._replace(library_powers=not is_printing_vectors())
     return _OTHER_TARGET.value or _this_process()
 
 

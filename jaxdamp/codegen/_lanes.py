@@ -8,6 +8,7 @@ from typing import NamedTuple, TypeGuard, final
 import numpy as np
 
 from jaxdamp.codegen import _arrays
+from jaxdamp.codegen._branches import where, without_need
 from jaxdamp.codegen._jaxprs import Inner, printing
 from jaxdamp.codegen._languages import FUNCTIONS, C
 from jaxdamp.codegen._loop_passes import Kept, kept_values, sums_of_products
@@ -62,7 +63,8 @@ class Loop(NamedTuple):
         if not self.straight:
             message = "A loop or a branch inside a step cannot be printed for many points side by side."
             raise NotImplementedError(message)
-        return _filled("lanes.c", self.parts | {"of_both": list(_in_turn(self.parts["of_both"]))})
+        in_turn = {name: list(_in_turn(self.parts[name])) for name in ("of_both", "of_simple")}
+        return _filled("lanes.c", self.parts | in_turn)
 
     @property
     def kernel(self) -> str:
@@ -70,17 +72,14 @@ class Loop(NamedTuple):
         return _filled("kernel.cu", self.parts)
 
 
-def lanes_in_c(
-    body: Inner, constants: Sequence[Operand], carry: Sequence[Operand], row: Sequence[Operand], *, arithmetic: bool
-) -> Loop:
+def lanes_in_c(body: Inner, constants: Sequence[Operand], carry: Sequence[Operand], row: Sequence[Operand]) -> Loop:
     """Print a loop whose body maps (constants, carry, row) to the carry of the next step.
 
     What depends neither on the point nor on the step is computed once, what depends on the point alone before the
     loop, what depends on the step alone once for all points.
 
     Raises:
-        NotImplementedError: the body cannot be printed; with `arithmetic`, it has loops, branches, or elementary
-            functions other than roots.
+        NotImplementedError: the body cannot be printed.
     """
     carry = list(carry)
     while True:
@@ -88,13 +87,11 @@ def lanes_in_c(
         operands = [names_of.atoms(operand, "shared", "own") for operand in constants]
         before = [names_of.atoms(operand, "now", "state") for operand in carry]
         rows = [names_of.atoms(operand, "row", "row") for operand in row]
-        with printing():
+        with printing(vectors=True):
             after = evaluated(writer, body, [*operands, *before, *rows])
         results = [atom for array in after for atom in array.ravel()]
         statements = pruned(writer.statements, names(results))
         levels = _levels(statements, names_of.levels)
-        if arithmetic:
-            _refuse_functions(statements, levels)
         grown = [
             operand._replace(level=operand.level | max((_level(atom, levels) for atom in array.ravel()), default=0))
             for operand, array in zip(carry, after, strict=True)
@@ -145,15 +142,6 @@ def _is_straight(statements: list[Statement]) -> TypeGuard[list[Define | Table]]
     return all(isinstance(statement, Define | Table) for statement in statements)
 
 
-def _refuse_functions(statements: list[Statement], levels: dict[str, int]) -> None:
-    """Refuse loops, and elementary functions, other than roots, of each point in each step."""
-    for s in statements:
-        if not isinstance(s, Define | Table):
-            raise NotImplementedError("A step with a loop or a branch is not printed where XLA is faster.")
-        if isinstance(s, Define) and s.operation in FUNCTIONS - {"sqrt"} and levels[s.target.name] == OF_BOTH:
-            raise NotImplementedError(f"A step with the function {s.operation!r} is not printed where XLA is faster.")
-
-
 def _levels(statements: Iterable[Statement], known: dict[str, int]) -> dict[str, int]:
     """What each value depends on; what loops and branches assign is taken to depend on all."""
     levels = dict(known)
@@ -173,12 +161,13 @@ def _parts(
 ) -> dict[str, str | list[str]]:
     printer = _InLanes()
     carried = _carried(before, after)
-    repeated, limits = list[Kept](), dict[str, Variable]()
+    repeated, limits, conditions = list[Kept](), dict[str, Variable](), dict[str, bool]()
     if _is_straight(statements):
-        repeated, carried, straight = _with_kept(statements, levels, carried)
+        repeated, carried, straight = _with_kept(_loaded(statements, levels), levels, carried)
         inside = {name for name, level in levels.items() if level == OF_BOTH}
         straight = sums_of_products(straight, inside, carried)
         straight, limits = _limited(straight, levels)
+        conditions = _without_functions(straight, levels, names(carried.values()))
         statements = [*straight]
     parts: dict[int, list[Statement]] = {level: [] for level in range(4)}
     for statement in statements:
@@ -191,6 +180,7 @@ def _parts(
     store += printer.lines(dict.fromkeys(s for value in repeated for s in value.first), 0)
     store += [f"{_kept_name(i)} = {value.target.name};" for i, value in enumerate(repeated)]
     ends = [(name, printer.atom(new)) for name, new in carried.items() if Variable(name, "float64") != new]
+    simpler = where(parts[OF_BOTH], conditions, names(carried.values()))
     counts = inputs.counts
     return {
         **{name: str(counts[name]) for name in ("shared", "own", "now", "state")},
@@ -201,6 +191,8 @@ def _parts(
         "of_point": [*printer.lines(parts[OF_POINT], 0), *store],
         "of_step": [*printer.lines(parts[OF_STEP], 0)],
         "of_both": [*load, *printer.lines(parts[OF_BOTH], 0), *_assigned(ends, now=False)],
+        "simple": " && ".join("!" * (not value) + name for name, value in conditions.items()) or "false",
+        "of_simple": [*load, *printer.lines(simpler, 0), *_assigned(ends, now=False)] if conditions else [],
         "next": _assigned(ends, now=True),
     }
 
@@ -219,6 +211,34 @@ def _carried(before: list[Atoms], after: list[Atoms]) -> dict[str, Atom]:
 
 def _kept_name(number: int) -> str:
     return f"kept[{number}][lane]"
+
+
+def _without_functions(statements: list[Define | Table], levels: dict[str, int], results: set[str]) -> dict[str, bool]:
+    """What conditions that are the same for all points and steps have to be, so that no step takes a function.
+
+    The knees of a curve, for instance, take exponentials only where they are rounded. None if functions are taken in
+    any case, or in none.
+    """
+    functions = {s.target.name for s in statements if isinstance(s, Define) and s.operation in FUNCTIONS - {"sqrt"}}
+    functions = {name for name in functions if levels.get(name, OF_BOTH) == OF_BOTH}
+    conditions = without_need(statements, results, functions)
+    return {} if conditions is None or any(map(levels.__getitem__, conditions)) else conditions
+
+
+def _loaded(statements: list[Define | Table], levels: dict[str, int]) -> list[Define | Table]:
+    """The same, with what selections choose from read before them: a choice of two places would be a gather."""
+    loaded: dict[Atom, Variable] = {}
+    written: list[Define | Table] = []
+    for s in statements:
+        if isinstance(s, Define) and s.operation == "select":
+            for atom in s.operands[1:]:
+                if isinstance(atom, Variable) and "[" in atom.name and atom not in loaded:
+                    loaded[atom] = Variable(f"loaded{len(loaded)}", atom.dtype)
+                    levels[loaded[atom].name] = levels[atom.name]
+                    written.append(Define(loaded[atom], "copy", (atom,)))
+            s = Define(s.target, s.operation, tuple(loaded.get(atom, atom) for atom in s.operands))
+        written.append(s)
+    return written
 
 
 def _with_kept(

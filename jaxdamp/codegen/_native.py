@@ -149,8 +149,8 @@ def registered(text: str, *functions: tuple[str, str]) -> str:
         NotImplementedError: as `library`.
     """
     own, loops = f"jaxdamp_loop_{hashlib.sha256(text.encode()).hexdigest()[:20]}", library(text, LOOP)
-    for platform, function in functions or (("cpu", "loop"),):
-        jax.ffi.register_ffi_target(own, jax.ffi.pycapsule(getattr(loops, function)), platform=platform)
+    for where, function in functions or (("cpu", "loop"),):
+        jax.ffi.register_ffi_target(own, jax.ffi.pycapsule(getattr(loops, function)), platform=where)
     return own
 
 

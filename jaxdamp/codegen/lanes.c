@@ -10,6 +10,11 @@
 #else
 #define VECTOR 4
 #endif
+/* Over all points of a block, in four vectors side by side. */
+#define IN_TURN                                       \
+    for (int base = 0; base < LANES; base += 4 * VECTOR) \
+        _Pragma("omp simd") for (int lanea = base; lanea < base + VECTOR; lanea++)
+#define OTHERS const int laneb = lanea + VECTOR, lanec = laneb + VECTOR, laned = lanec + VECTOR
 #define ROW(name, count) double name[(count) ? (count) : 1][LANES] __attribute__((aligned(64)))
 
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
@@ -62,12 +67,17 @@ static void run(const double *restrict shared, const double *restrict own_in, co
             const double *restrict row = rows + step * ROWS;
             (void)row;
 @of_step@
-            for (int base = 0; base < LANES; base += 4 * VECTOR)
-#pragma omp simd
-                for (int lanea = base; lanea < base + VECTOR; lanea++) {
-                    const int laneb = lanea + VECTOR, lanec = laneb + VECTOR, laned = lanec + VECTOR;
+            if (@simple@) {
+                IN_TURN {
+                    OTHERS;
+@of_simple@
+                }
+            } else {
+                IN_TURN {
+                    OTHERS;
 @of_both@
                 }
+            }
 @next@
         }
         for (int i = 0; i < STATE; i++)
