@@ -169,10 +169,7 @@ def _parts(
         straight, limits = _limited(straight, levels)
         conditions = _without_functions(straight, levels, names(carried.values()))
         statements = [*straight]
-    parts: dict[int, list[Statement]] = {level: [] for level in range(4)}
-    for statement in statements:
-        level = levels.get(statement.target.name, OF_BOTH) if isinstance(statement, Define | Table) else OF_BOTH
-        parts[level].append(statement)
+    parts = _by_level(statements, levels)
     hoisted = _read_later(parts[OF_POINT], parts[OF_BOTH], carried.values())
     load = [f"const {printer.types[v.dtype]} {v.name} = hoisted[{i}][lane];" for i, v in enumerate(hoisted)]
     store = [f"hoisted[{i}][lane] = {v.name};" for i, v in enumerate(hoisted)]
@@ -181,6 +178,9 @@ def _parts(
     store += [f"{_kept_name(i)} = {value.target.name};" for i, value in enumerate(repeated)]
     ends = [(name, printer.atom(new)) for name, new in carried.items() if Variable(name, "float64") != new]
     simpler = where(parts[OF_BOTH], conditions, names(carried.values()))
+    of_both, of_simple = (
+        [*load, *printer.lines(body, 0), *_assigned(ends, now=False)] for body in (parts[OF_BOTH], simpler)
+    )
     counts = inputs.counts
     return {
         **{name: str(counts[name]) for name in ("shared", "own", "now", "state")},
@@ -190,11 +190,19 @@ def _parts(
         "once": [*printer.lines(parts[0], 0)],
         "of_point": [*printer.lines(parts[OF_POINT], 0), *store],
         "of_step": [*printer.lines(parts[OF_STEP], 0)],
-        "of_both": [*load, *printer.lines(parts[OF_BOTH], 0), *_assigned(ends, now=False)],
+        "of_both": of_both,
         "simple": " && ".join("!" * (not value) + name for name, value in conditions.items()) or "false",
-        "of_simple": [*load, *printer.lines(simpler, 0), *_assigned(ends, now=False)] if conditions else [],
+        "of_simple": of_simple if conditions else [],
         "next": _assigned(ends, now=True),
     }
+
+
+def _by_level(statements: list[Statement], levels: dict[str, int]) -> dict[int, list[Statement]]:
+    """Statements by what they depend on."""
+    parts: dict[int, list[Statement]] = {level: [] for level in range(4)}
+    for s in statements:
+        parts[levels.get(s.target.name, OF_BOTH) if isinstance(s, Define | Table) else OF_BOTH].append(s)
+    return parts
 
 
 def _read_later(statements: list[Statement], inside: list[Statement], results: Iterable[Atom]) -> list[Variable]:

@@ -58,6 +58,10 @@ def library(text: str, build: Build = FIT) -> ctypes.CDLL:
     The file is named by its text, compiler and processor, and by what it holds, so that another one is never loaded
     for it; the folder must be this user's and closed to others, or else the file is only that of this process.
 
+    Arguments:
+        text: C.
+        build: how it is compiled.
+
     Raises:
         NotImplementedError: no C compiler, or one that refuses the text; no room for temporary files, or none from
             which programs may run. The message holds what was said.
