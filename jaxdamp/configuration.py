@@ -45,9 +45,9 @@ def configure(
 ) -> Configuration:
     """Set up JAX for suspension work; call it first, before anything is computed.
 
-    Everything works without it, more slowly and in single precision: rides and optima are right to about 0.1 %, on a GPU
-    to about 1 %, but standard errors of fits with many parameters are rough. Importing jaxdamp changes nothing; this call
-    changes settings of the whole process:
+    Everything works without it, more slowly and in single precision: rides and optima are right to about 0.1 %, on a
+    GPU to about 1 %, but standard errors of fits with many parameters are rough. Importing jaxdamp changes nothing;
+    this call changes settings of the whole process:
 
     - `x64`: numbers of 64 bits. Laws and vehicles made before keep their 32 bits.
     - `cpu_devices`: the processor is shown to JAX as so many devices, which `sweep` uses side by side.

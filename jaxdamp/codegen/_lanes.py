@@ -191,10 +191,15 @@ def _parts(
         "of_point": [*printer.lines(parts[OF_POINT], 0), *store],
         "of_step": [*printer.lines(parts[OF_STEP], 0)],
         "of_both": of_both,
-        "simple": " && ".join("!" * (not value) + name for name, value in conditions.items()) or "false",
+        "simple": _all(conditions),
         "of_simple": of_simple if conditions else [],
         "next": _assigned(ends, now=True),
     }
+
+
+def _all(conditions: dict[str, bool]) -> str:
+    """Whether all conditions are what they have to be; false if there are none."""
+    return " && ".join("!" * (not value) + name for name, value in conditions.items()) or "false"
 
 
 def _by_level(statements: list[Statement], levels: dict[str, int]) -> dict[int, list[Statement]]:
