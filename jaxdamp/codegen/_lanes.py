@@ -103,10 +103,12 @@ def lanes_in_c(body: Inner, constants: Sequence[Operand], carry: Sequence[Operan
 
 
 class _InLanes(C):
-    """C with limits that are the same in all steps."""
+    """C with limits that are the same in all steps, and conditions as numbers by a choice: a cast is no vector."""
 
     def own(self, operation: str, texts: list[str], dtypes: list[str], dtype: str) -> str | None:
         """As in C."""
+        if operation == "convert" and dtypes == ["bool"] and dtype == "float64":
+            return f"{texts[0]} ? 1.0 : 0.0"
         first, _, limit = operation.partition("limiting ")
         return super().own(operation, texts, dtypes, dtype) if first else _LIMITS[limit].format(*texts)
 
