@@ -11,7 +11,7 @@ from jaxdamp.simulation import Exponential
 METRIC = "rms_sprung_acceleration"
 
 
-def ride(case: str, road: problem.Heights, dt: float = 1e-3, *, printed: bool = False) -> Ride:
+def ride(case: str, road: problem.Heights, dt: float = 1e-3, *, printed: bool | None = None) -> Ride:
     """The car of a case, with the law of the first row that is drawn, on a road given at instants."""
     profile = roads.from_profile(np.arange(road.shape[0]) * dt, road)
     car = problem.vehicle(problem.law(case, problem.draw(case, 1)[0]), case)

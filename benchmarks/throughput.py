@@ -25,7 +25,6 @@ from benchmarks import ours  # noqa: E402
 from benchmarks._timing import best, report  # noqa: E402
 from benchmarks.peers import c, casadi_map, diffrax_vmapped, problem, scipy_numba  # noqa: E402
 from jaxdamp import sweep  # noqa: E402
-from jaxdamp.codegen import compiler  # noqa: E402
 from jaxdamp.sweeps import points  # noqa: E402
 
 
@@ -36,7 +35,7 @@ CARS = {"jaxdamp": 8192 if QUICK else 32_768, "c": 4096, "diffrax": 1024, "scipy
 
 
 def swept(
-    case: str, road: problem.Heights, cars: int, devices: int, *, printed: bool = False
+    case: str, road: problem.Heights, cars: int, devices: int, *, printed: bool | None = None
 ) -> tuple[float, np.ndarray]:
     """Cars a second of a sweep after its first call, best of three, and the results of the first cars."""
     ride, table = ours.ride(case, road, printed=printed), problem.draw(case, cars)
@@ -53,16 +52,6 @@ def swept(
         rates.append((last - first) / (end - begin))
         found = data[ours.METRIC].values
     return max(rates), found
-
-
-def printed_rates(case: str, road: problem.Heights) -> list[float]:
-    """Rates of the loop printed as C, on one core and on all; none of a law that cannot be printed."""
-    counts = (1, 1 if QUICK else DONE.cpu_devices)
-    try:
-        rates = [swept(case, road, CARS["jaxdamp"], n, printed=True)[0] for n in counts]
-    except NotImplementedError:
-        return []
-    return [rate * STEPS / 1e6 for rate in rates]
 
 
 def c_rates(case: str, road: problem.Heights, exact: np.ndarray) -> list[list[Any]]:
@@ -107,12 +96,10 @@ def main() -> None:
         road = problem.heights(case, DURATION, DT)
         exact = problem.reference(case, problem.draw(case, FEW), road, DT)
         counts = (1,) if QUICK else range(1, DONE.cpu_devices + 1)
-        both = [swept(case, road, CARS["jaxdamp"], n) for n in counts]
-        alone, all_cores = both[0][0], both[-1][0]
         error = problem.errors(problem.simulated(case, problem.draw(case, FEW), road, DT), exact).max()
-        rows.append([case, "jaxdamp.sweep", alone * STEPS / 1e6, all_cores * STEPS / 1e6, float(error)])
-        if compiler() is not None and (printed := printed_rates(case, road)):
-            rows.append([case, "jaxdamp.sweep, printed as C", *printed, float(error)])
+        for name, printed in (("jaxdamp.sweep", None), ("jaxdamp.sweep, by XLA", False)):
+            both = [swept(case, road, CARS["jaxdamp"], n, printed=printed)[0] * STEPS / 1e6 for n in counts]
+            rows.append([case, name, both[0], both[-1], float(error)])
         if c.available():
             rows += c_rates(case, road, exact)
         if "--c-only" not in sys.argv and not QUICK:
