@@ -11,7 +11,7 @@ import jax
 from jaxdamp import _checks
 from jaxdamp._files import cache_home
 from jaxdamp._forked import started
-from jaxdamp.codegen import is_printing
+from jaxdamp.codegen import is_printing, is_printing_vectors
 
 
 # A loop whose body touches fewer bytes than the threshold is compiled as one function; XLA's own threshold is 1 kB.
@@ -45,15 +45,17 @@ def configure(
 ) -> Configuration:
     """Set up JAX for suspension work; call it first, before anything is computed.
 
-    Everything works without it, more slowly and in single precision: rides and optima are right to about 0.1 %, but
-    standard errors of fits with many parameters are rough. Importing jaxdamp changes nothing; this call
-    changes settings of the whole process:
+    Everything works without it, more slowly and in single precision: rides and optima are right to about 0.1 %, on a
+    GPU to about 1 %, but standard errors of fits with many parameters are rough. Importing jaxdamp changes nothing;
+    this call changes settings of the whole process:
 
     - `x64`: numbers of 64 bits. Laws and vehicles made before keep their 32 bits.
     - `cpu_devices`: the processor is shown to JAX as so many devices, which `sweep` uses side by side.
     - `fused_loops`: XLA compiles every small loop over time as one function (XLA option
       `xla_cpu_small_while_loop_byte_threshold`, 16 MiB) with vectors of 512 bits where the processor has them. One car
       runs ten times as fast, a sweep three times.
+    - In single precision a GPU multiplies matrices with all 24 bits, not with the 11 that JAX gives it (TF32), unless
+      `jax_default_matmul_precision` says something else.
     - `cache`: compiled programs that took more than 0.2 s are kept in a folder, for the next process.
 
     A second call with the same settings does nothing, so that a notebook cell can be run again.
@@ -82,6 +84,8 @@ def configure(
         jax.config.update("jax_num_cpu_devices", devices)
         os.environ["XLA_FLAGS"] = _with_option(os.environ.get("XLA_FLAGS", ""), fused_loops)
     jax.config.update("jax_enable_x64", x64)
+    if jax.config.jax_default_matmul_precision is None:  # pyright: ignore[reportAttributeAccessIssue]
+        jax.config.update("jax_default_matmul_precision", "highest")
     folder = _folder(cache)
     jax.config.update("jax_compilation_cache_dir", str(folder) if folder else None)
     if folder:
@@ -95,30 +99,32 @@ class Target(NamedTuple):
     Attributes:
         fused_loops: XLA compiles loops over time as one function.
         reciprocal_roots: the device has an instruction for many 1/√x at a time (AVX-512); XLA then starts from it.
-        library_functions: exponentials, logarithms and powers are those of the compiler's own library, one number at a
-            time: fastest for one car, and in printed C (`jaxdamp.codegen`).
+        library_functions: exponentials and logarithms are those of the compiler's own library, one number at a time:
+            fastest for one car, and in printed C (`jaxdamp.codegen`).
+        library_powers: powers too; of many cars side by side they are exponentials of logarithms.
     """
 
     fused_loops: bool
     reciprocal_roots: bool
     library_functions: bool = False
+    library_powers: bool = False
 
 
 # One car on a processor of any kind, with the elementary functions of the C library.
-_PRINTED = Target(fused_loops=False, reciprocal_roots=False, library_functions=True)
+_PRINTED = Target(fused_loops=False, reciprocal_roots=False, library_functions=True, library_powers=True)
 # Part of the key of compiled functions: what was traced for one target is not taken for another.
 _OTHER_TARGET = jax.make_user_context(None)
 
 
 def one_at_a_time() -> AbstractContextManager[None]:
     """Functions traced inside are for one car: they take the library's elementary functions."""
-    return _OTHER_TARGET(target()._replace(library_functions=True))
+    return _OTHER_TARGET(target()._replace(library_functions=True, library_powers=True))
 
 
 def target() -> Target:
     """What the function that is being traced is compiled for; by default this process, see `_this_process`."""
     if is_printing():
-        return _PRINTED
+        return _PRINTED._replace(library_powers=not is_printing_vectors())
     return _OTHER_TARGET.value or _this_process()
 
 

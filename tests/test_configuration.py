@@ -20,6 +20,10 @@ before = dict(jax.config.values), dict(os.environ), sys.getrecursionlimit()
 import jaxdamp
 assert (dict(jax.config.values), dict(os.environ), sys.getrecursionlimit()) == before
 jaxdamp.configure(cache=False)
+assert jax.config.jax_default_matmul_precision == "highest"  # of a GPU in single precision
+jax.config.update("jax_default_matmul_precision", "tensorfloat32")
+jaxdamp.configure(cache=False)
+assert jax.config.jax_default_matmul_precision == "tensorfloat32"
 """
 
 CONFIGURING = """

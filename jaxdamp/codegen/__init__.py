@@ -12,7 +12,11 @@ functions are those of the language's own library. A primitive that cannot be pr
 `printed_scan` prints a loop over time for many points side by side, compiles it and calls it from JAX.
 """
 
-from jaxdamp.codegen._jaxprs import is_printing as is_printing, printing as printing
+from jaxdamp.codegen._jaxprs import (
+    is_printing as is_printing,
+    is_printing_vectors as is_printing_vectors,
+    printing as printing,
+)
 from jaxdamp.codegen._languages import AbstractLanguage as AbstractLanguage, C, JavaScript, PrintedFunction
 from jaxdamp.codegen._lowering import Program as Program, Symbols as Symbols, lower, symbols
 from jaxdamp.codegen._native import compiler, library as library

@@ -14,10 +14,12 @@ from jaxdamp.codegen._program import (
     Define,
     Loop,
     Statement,
+    Table,
     Variable,
     constant,
     names,
     names_in,
+    pruned,
 )
 
 
@@ -60,6 +62,33 @@ def in_branches(
         body = list(chain.from_iterable(_assigned(s, shared) for s in run))
         written.append(Branch(of.condition, [[], body] if of.value else [body, []]))
     return [*(Declare(v, constant(0, v.dtype)) for v in sorted(shared, key=lambda v: v.name)), *written]
+
+
+def without_need(statements: Sequence[Define | Table], results: set[str], costly: set[str]) -> dict[str, bool] | None:
+    """What conditions of selections have to be, by name, so that nothing costly is used; None if something always is.
+
+    Arguments:
+        statements: of a block without loops.
+        results: names that are used after it.
+        costly: names of what is costly.
+    """
+    cases = _cases(statements, results, set())
+    needed = {cases[name] for name in costly}
+    avoiding = {case.condition.name: not case.value for case in needed if case}
+    return avoiding if None not in needed and len(avoiding) == len(needed) else None
+
+
+def where(statements: Sequence[Statement], conditions: Mapping[str, bool], results: set[str]) -> list[Statement]:
+    """The statements that are left where conditions of selections are known."""
+
+    def chosen(s: Statement) -> Statement:
+        if not isinstance(s, Define) or s.operation != "select":
+            return s
+        condition, yes, no = s.operands
+        known = conditions.get(condition.name) if isinstance(condition, Variable) else None
+        return s if known is None else Define(s.target, "copy", (yes if known else no,))
+
+    return pruned([chosen(s) for s in statements], results)
 
 
 def _runs(

@@ -13,17 +13,22 @@ from jaxtyping import Array, ArrayLike, PyTree
 
 
 # Part of the key of compiled functions: what was traced to be printed is not taken for what XLA runs.
-_PRINTING = jax.make_user_context(False)
+_PRINTING = jax.make_user_context("")
 
 
-def printing() -> AbstractContextManager[None]:
-    """Functions traced inside are printed."""
-    return _PRINTING(True)
+def printing(*, vectors: bool = False) -> AbstractContextManager[None]:
+    """Functions traced inside are printed; for many points side by side in vectors, or for one."""
+    return _PRINTING("vectors" if vectors else "numbers")
 
 
 def is_printing() -> bool:
     """Whether the function that is being traced will be printed: it best uses elementary functions of a C library."""
     return bool(_PRINTING.value)
+
+
+def is_printing_vectors() -> bool:
+    """Whether it will be printed for many points side by side."""
+    return _PRINTING.value == "vectors"
 
 
 Inner: TypeAlias = Jaxpr | ClosedJaxpr

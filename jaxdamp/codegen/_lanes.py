@@ -1,12 +1,14 @@
 """The body of a loop over steps as C for many points side by side."""
 
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from importlib import resources
 from typing import NamedTuple, TypeGuard, final
 
 import numpy as np
 
 from jaxdamp.codegen import _arrays
+from jaxdamp.codegen._branches import where, without_need
 from jaxdamp.codegen._jaxprs import Inner, printing
 from jaxdamp.codegen._languages import FUNCTIONS, C
 from jaxdamp.codegen._loop_passes import Kept, kept_values, sums_of_products
@@ -36,6 +38,7 @@ _LIMITS = {"min": "{1} < {0} ? {1} : {0}", "max": "{1} > {0} ? {1} : {0}"}
 _NAN = constant(np.nan, "float64")
 _SPOILT = ("for (int i = 0; i < STATE; i++)", "    state[i][lane] += missing;")
 WIDTH = 16  # of the printed block in the template
+_VECTORS = "abcd"  # of a block that a step takes in turn, operation by operation: each waits for its own last result
 
 
 @final
@@ -60,7 +63,8 @@ class Loop(NamedTuple):
         if not self.straight:
             message = "A loop or a branch inside a step cannot be printed for many points side by side."
             raise NotImplementedError(message)
-        return _filled("lanes.c", self.parts)
+        in_turn = {name: list(_in_turn(self.parts[name])) for name in ("of_both", "of_simple")}
+        return _filled("lanes.c", self.parts | in_turn)
 
     @property
     def kernel(self) -> str:
@@ -68,17 +72,14 @@ class Loop(NamedTuple):
         return _filled("kernel.cu", self.parts)
 
 
-def lanes_in_c(
-    body: Inner, constants: Sequence[Operand], carry: Sequence[Operand], row: Sequence[Operand], *, arithmetic: bool
-) -> Loop:
+def lanes_in_c(body: Inner, constants: Sequence[Operand], carry: Sequence[Operand], row: Sequence[Operand]) -> Loop:
     """Print a loop whose body maps (constants, carry, row) to the carry of the next step.
 
     What depends neither on the point nor on the step is computed once, what depends on the point alone before the
     loop, what depends on the step alone once for all points.
 
     Raises:
-        NotImplementedError: the body cannot be printed; with `arithmetic`, it has loops, branches, or elementary
-            functions other than roots.
+        NotImplementedError: the body cannot be printed.
     """
     carry = list(carry)
     while True:
@@ -86,13 +87,11 @@ def lanes_in_c(
         operands = [names_of.atoms(operand, "shared", "own") for operand in constants]
         before = [names_of.atoms(operand, "now", "state") for operand in carry]
         rows = [names_of.atoms(operand, "row", "row") for operand in row]
-        with printing():
+        with printing(vectors=True):
             after = evaluated(writer, body, [*operands, *before, *rows])
         results = [atom for array in after for atom in array.ravel()]
         statements = pruned(writer.statements, names(results))
         levels = _levels(statements, names_of.levels)
-        if arithmetic:
-            _refuse_functions(statements, levels)
         grown = [
             operand._replace(level=operand.level | max((_level(atom, levels) for atom in array.ravel()), default=0))
             for operand, array in zip(carry, after, strict=True)
@@ -143,15 +142,6 @@ def _is_straight(statements: list[Statement]) -> TypeGuard[list[Define | Table]]
     return all(isinstance(statement, Define | Table) for statement in statements)
 
 
-def _refuse_functions(statements: list[Statement], levels: dict[str, int]) -> None:
-    """Refuse loops, and elementary functions, other than roots, of each point in each step."""
-    for s in statements:
-        if not isinstance(s, Define | Table):
-            raise NotImplementedError("A step with a loop or a branch is not printed where XLA is faster.")
-        if isinstance(s, Define) and s.operation in FUNCTIONS - {"sqrt"} and levels[s.target.name] == OF_BOTH:
-            raise NotImplementedError(f"A step with the function {s.operation!r} is not printed where XLA is faster.")
-
-
 def _levels(statements: Iterable[Statement], known: dict[str, int]) -> dict[str, int]:
     """What each value depends on; what loops and branches assign is taken to depend on all."""
     levels = dict(known)
@@ -171,17 +161,15 @@ def _parts(
 ) -> dict[str, str | list[str]]:
     printer = _InLanes()
     carried = _carried(before, after)
-    repeated, limits = list[Kept](), dict[str, Variable]()
+    repeated, limits, conditions = list[Kept](), dict[str, Variable](), dict[str, bool]()
     if _is_straight(statements):
-        repeated, carried, straight = _with_kept(statements, levels, carried)
+        repeated, carried, straight = _with_kept(_loaded(statements, levels), levels, carried)
         inside = {name for name, level in levels.items() if level == OF_BOTH}
-        straight = sums_of_products(straight, inside, carried.values())
+        straight = sums_of_products(straight, inside, carried)
         straight, limits = _limited(straight, levels)
+        conditions = _without_functions(straight, levels, names(carried.values()))
         statements = [*straight]
-    parts: dict[int, list[Statement]] = {level: [] for level in range(4)}
-    for statement in statements:
-        level = levels.get(statement.target.name, OF_BOTH) if isinstance(statement, Define | Table) else OF_BOTH
-        parts[level].append(statement)
+    parts = _by_level(statements, levels)
     hoisted = _read_later(parts[OF_POINT], parts[OF_BOTH], carried.values())
     load = [f"const {printer.types[v.dtype]} {v.name} = hoisted[{i}][lane];" for i, v in enumerate(hoisted)]
     store = [f"hoisted[{i}][lane] = {v.name};" for i, v in enumerate(hoisted)]
@@ -189,6 +177,10 @@ def _parts(
     store += printer.lines(dict.fromkeys(s for value in repeated for s in value.first), 0)
     store += [f"{_kept_name(i)} = {value.target.name};" for i, value in enumerate(repeated)]
     ends = [(name, printer.atom(new)) for name, new in carried.items() if Variable(name, "float64") != new]
+    simpler = where(parts[OF_BOTH], conditions, names(carried.values()))
+    of_both, of_simple = (
+        [*load, *printer.lines(body, 0), *_assigned(ends, now=False)] for body in (parts[OF_BOTH], simpler)
+    )
     counts = inputs.counts
     return {
         **{name: str(counts[name]) for name in ("shared", "own", "now", "state")},
@@ -198,9 +190,24 @@ def _parts(
         "once": [*printer.lines(parts[0], 0)],
         "of_point": [*printer.lines(parts[OF_POINT], 0), *store],
         "of_step": [*printer.lines(parts[OF_STEP], 0)],
-        "of_both": [*load, *printer.lines(parts[OF_BOTH], 0), *_assigned(ends, now=False)],
+        "of_both": of_both,
+        "simple": _all(conditions),
+        "of_simple": of_simple if conditions else [],
         "next": _assigned(ends, now=True),
     }
+
+
+def _all(conditions: dict[str, bool]) -> str:
+    """Whether all conditions are what they have to be; false if there are none."""
+    return " && ".join("!" * (not value) + name for name, value in conditions.items()) or "false"
+
+
+def _by_level(statements: list[Statement], levels: dict[str, int]) -> dict[int, list[Statement]]:
+    """Statements by what they depend on."""
+    parts: dict[int, list[Statement]] = {level: [] for level in range(4)}
+    for s in statements:
+        parts[levels.get(s.target.name, OF_BOTH) if isinstance(s, Define | Table) else OF_BOTH].append(s)
+    return parts
 
 
 def _read_later(statements: list[Statement], inside: list[Statement], results: Iterable[Atom]) -> list[Variable]:
@@ -217,6 +224,34 @@ def _carried(before: list[Atoms], after: list[Atoms]) -> dict[str, Atom]:
 
 def _kept_name(number: int) -> str:
     return f"kept[{number}][lane]"
+
+
+def _without_functions(statements: list[Define | Table], levels: dict[str, int], results: set[str]) -> dict[str, bool]:
+    """What conditions that are the same for all points and steps have to be, so that no step takes a function.
+
+    The knees of a curve, for instance, take exponentials only where they are rounded. None if functions are taken in
+    any case, or in none.
+    """
+    functions = {s.target.name for s in statements if isinstance(s, Define) and s.operation in FUNCTIONS - {"sqrt"}}
+    functions = {name for name in functions if levels.get(name, OF_BOTH) == OF_BOTH}
+    conditions = without_need(statements, results, functions)
+    return {} if conditions is None or any(map(levels.__getitem__, conditions)) else conditions
+
+
+def _loaded(statements: list[Define | Table], levels: dict[str, int]) -> list[Define | Table]:
+    """The same, with what selections choose from read before them: a choice of two places would be a gather."""
+    loaded: dict[Atom, Variable] = {}
+    written: list[Define | Table] = []
+    for s in statements:
+        if isinstance(s, Define) and s.operation == "select":
+            for atom in s.operands[1:]:
+                if isinstance(atom, Variable) and "[" in atom.name and atom not in loaded:
+                    loaded[atom] = Variable(f"loaded{len(loaded)}", atom.dtype)
+                    levels[loaded[atom].name] = levels[atom.name]
+                    written.append(Define(loaded[atom], "copy", (atom,)))
+            s = Define(s.target, s.operation, tuple(loaded.get(atom, atom) for atom in s.operands))
+        written.append(s)
+    return written
 
 
 def _with_kept(
@@ -275,6 +310,15 @@ def _assigned(pairs: list[tuple[str, str]], *, now: bool) -> list[str]:
     pairs = [pair for pair in pairs if pair[0].startswith("now") == now]
     copies = [f"const double after{i} = {value};" for i, (_, value) in enumerate(pairs)]
     return copies + [f"{target} = after{i};" for i, (target, _) in enumerate(pairs)]
+
+
+def _in_turn(lines: Iterable[str]) -> Iterator[str]:
+    """Each line for one vector after the other, with names of its own for what it defines."""
+    lines = list(lines)
+    own = {"lane", *(name for line in lines for name in re.findall(r"^ *const \w+ (\w+)", line))}
+    for line in lines:
+        for vector in _VECTORS:
+            yield re.sub(r"[A-Za-z]\w*", lambda word, v=vector: word[0] + v * (word[0] in own), line)
 
 
 def _filled(template: str, marks: dict[str, str | list[str]]) -> str:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 from jaxdamp.codegen._program import Atom, Constant, Define, Table, Variable, names, operands_of, pruned
 
 
+CYCLES = {"add": 4.0, "sub": 4.0, "mul": 4.0, "div": 14.0, "sqrt": 20.0, "exp": 40.0, "pow": 80.0}  # about
 WORTH_KEEPING = 4  # operations, of which a store and a load of the next step take the place
 
 
@@ -57,16 +58,37 @@ def _computed_before(
     return moved, defined
 
 
+def _ready(statements: Sequence[Define | Table], inside: set[str], after: Mapping[str, Atom]) -> dict[str, float]:
+    """After how many clock cycles of a step each value is known, those of the step before counted from its end."""
+    ready: dict[str, float] = {}
+    for _ in range(2):  # in the first round nobody knows yet when the step before was done
+        end = max([0.0, *ready.values()])
+        ready = {name: ready.get(new.name, 0.0) - end for name, new in after.items() if isinstance(new, Variable)}
+        for s in statements:
+            if isinstance(s, Define) and s.target.name in inside:
+                before = max((ready.get(name, -end) for name in names(s.operands)), default=-end)
+                ready[s.target.name] = before + CYCLES.get(s.operation, 2.0)
+    return ready
+
+
 def _tree(name: str, defined: Mapping[str, Define]) -> list[Define]:
     """The statements that a value takes, in their order."""
     return [s for s in pruned(list(defined.values()), {name}) if isinstance(s, Define)]
 
 
 def sums_of_products(
-    statements: Sequence[Define | Table], inside: set[str], results: Iterable[Atom]
+    statements: Sequence[Define | Table], inside: set[str], after: Mapping[str, Atom]
 ) -> list[Define | Table]:
-    """The same with products added last to each sum, one after the other, so that each is one multiply-add."""
-    sums = _Sums(statements, inside, results)
+    """The same with products added last to each sum, one after the other, so that each is one multiply-add.
+
+    Among products, what is computed last is added last, so that as little as possible waits for it.
+
+    Arguments:
+        statements: of the body.
+        inside: names of what is computed in every step.
+        after: for each carried number, its value in the next step.
+    """
+    sums = _Sums(statements, inside, after)
     chains, replaced = sums.chains()
     written: list[Define | Table] = []
     for s in statements:
@@ -80,9 +102,10 @@ def sums_of_products(
 class _Sums:
     """The sums among statements, with the sums inside them whose value is used nowhere else."""
 
-    def __init__(self, statements: Sequence[Define | Table], inside: set[str], results: Iterable[Atom]) -> None:
+    def __init__(self, statements: Sequence[Define | Table], inside: set[str], after: Mapping[str, Atom]) -> None:
         self._uses = Counter(a.name for s in statements for a in operands_of(s) if isinstance(a, Variable))
-        self._uses.update(a.name for a in results if isinstance(a, Variable))
+        self._uses.update(a.name for a in after.values() if isinstance(a, Variable))
+        self._ready = _ready(statements, inside, after)
         self._parts = {s.target.name: s for s in statements if isinstance(s, Define) and s.target.name in inside}
 
     def chains(self) -> tuple[dict[str, list[tuple[bool, Atom]]], set[str]]:
@@ -91,7 +114,7 @@ class _Sums:
         nested = {within.target.name for s in sums for within in self._inner(s)}
         chains, replaced = {}, set()
         for s in sums:
-            terms = sorted(self._terms(s, False), key=lambda term: (self._is_product(term[1]), term[0]))
+            terms = sorted(self._terms(s, False), key=self._place)
             has_number = any(isinstance(atom, Constant) for _, atom in terms)  # may be there to round another term
             products = sum(self._is_product(atom) for _, atom in terms)
             if s.target.name not in nested and not has_number and products > 1:
@@ -108,6 +131,11 @@ class _Sums:
 
     def _is_product(self, atom: Atom) -> bool:
         return self._part(atom, "mul") is not None
+
+    def _place(self, term: tuple[bool, Atom]) -> tuple[bool, float, bool]:
+        """By which terms are sorted."""
+        minus, atom = term
+        return self._is_product(atom), self._ready.get(atom.name, 0.0) if isinstance(atom, Variable) else 0.0, minus
 
     def _inner(self, s: Define) -> list[Define]:
         """The sums whose only use is in this one, and those in them."""

@@ -11,7 +11,6 @@ import shutil
 import subprocess
 import tempfile
 import uuid
-from collections.abc import Sequence
 from importlib import resources, util
 from pathlib import Path
 from typing import NamedTuple
@@ -19,17 +18,19 @@ from typing import NamedTuple
 import jax
 
 
-# Multiplications and additions are fused as XLA fuses them; sums stay in their order, what is not finite stays so.
-_FLAGS = (
-    "-std=gnu11 -O3 -march=native -fPIC -shared -w -fopenmp-simd -fno-math-errno -fno-trapping-math -fno-signed-zeros "
-    "-freciprocal-math -ffp-contract=fast"
-).split()
+class Build(NamedTuple):
+    """How a C text is compiled: the first that the compiler takes, of several sets of options."""
+
+    options: tuple[tuple[str, ...], ...]
+    with_xla: bool = False  # whether it needs the headers of XLA
+
+
+_COMMON = "-std=gnu11 -march=native -fPIC -shared -w -fopenmp-simd -fno-math-errno -fno-trapping-math -fno-signed-zeros"
 # Of a fit: little time to compile, derivatives in vectors of the processor.
-_PLAIN = (
-    "-std=gnu11 -O2 -march=native -fPIC -shared -w -fopenmp-simd -ftree-vectorize -fno-math-errno -fno-trapping-math "
-    "-fno-signed-zeros -ffp-contract=fast"
-).split()
-_WIDE = ("-mprefer-vector-width=512", "-mrecip")  # of gcc for x86
+FIT = Build((tuple(f"{_COMMON} -O2 -ftree-vectorize -ffp-contract=fast -lm".split()),))
+# Multiplications and additions are fused as XLA fuses them; sums stay in their order, what is not finite stays so.
+_LOOP = tuple(f"{_COMMON} -O3 -freciprocal-math -ffp-contract=fast -lm".split())
+LOOP = Build(((*_LOOP, "-mprefer-vector-width=512", "-mrecip", "-lmvec", "-ldl"), _LOOP), with_xla=True)  # gcc for x86
 
 
 def compiler() -> str | None:
@@ -51,34 +52,60 @@ def compiled_by() -> str:
 
 
 @functools.cache
-def library(text: str) -> ctypes.CDLL:
+def library(text: str, build: Build = FIT) -> ctypes.CDLL:
     """A C text compiled and loaded; kept for other processes beside the compiled programs of JAX, where these are kept.
 
     The file is named by its text, compiler and processor, and by what it holds, so that another one is never loaded
     for it; the folder must be this user's and closed to others, or else the file is only that of this process.
 
+    Arguments:
+        text: C.
+        build: how it is compiled.
+
     Raises:
-        NotImplementedError: as `registered`.
+        NotImplementedError: no C compiler, or one that refuses the text; no room for temporary files, or none from
+            which programs may run. The message holds what was said.
     """
-    tool = compiled_by()
-    own = hashlib.sha256("\n".join([text, tool, *_PLAIN, _processor()]).encode()).hexdigest()[:24]
-    try:
-        folder = _lasting_folder() or _folder()
-        for path in folder.glob(f"fit_{own}_*.so"):
-            if path.stem.endswith(hashlib.sha256(path.read_bytes()).hexdigest()[:24]):
-                return ctypes.CDLL(str(path))
-        draft = folder / f"{own}-{uuid.uuid4().hex}"
-        source, target = draft.with_suffix(".c"), draft.with_suffix(".tmp")
-        source.write_text(text, encoding="utf-8")
-        done = subprocess.run([tool, *_PLAIN, str(source), "-o", str(target), "-lm"], capture_output=True, text=True)
-        source.unlink()
-        if done.returncode:
-            raise NotImplementedError(f"{tool} does not compile the printed functions: {done.stderr.strip()[-2000:]}")
-        path = folder / f"fit_{own}_{hashlib.sha256(target.read_bytes()).hexdigest()[:24]}.so"
-        target.replace(path)
-        return ctypes.CDLL(str(path))
-    except OSError as error:
-        raise NotImplementedError(f"The printed functions cannot be compiled or loaded here ({error}).") from error
+    tool, problem = compiled_by(), None
+    headers = [f"-I{jax.ffi.include_dir()}", f"-I{resources.files('jaxdamp.codegen')}"] if build.with_xla else []
+    for place in (_lasting_folder, _folder):
+        try:
+            folder = place()
+            if folder is not None:
+                return _loaded(folder, text, [tool, *headers], build)
+        except OSError as error:  # such as a folder from which no program may run
+            problem = error
+    remedy = "Name another folder for temporary files, from which programs may run, in the variable TMPDIR."
+    raise NotImplementedError(f"Printed functions cannot be compiled or loaded here ({problem}). {remedy}") from problem
+
+
+def _loaded(folder: Path, text: str, command: list[str], build: Build) -> ctypes.CDLL:
+    """From a folder where it may be already."""
+    own = hashlib.sha256("\n".join([text, *command, str(build), _processor()]).encode()).hexdigest()[:24]
+    for path in folder.glob(f"c_{own}_*.so"):
+        if path.stem.endswith(hashlib.sha256(path.read_bytes()).hexdigest()[:24]):
+            return ctypes.CDLL(str(path))
+    draft = folder / f"{own}-{uuid.uuid4().hex}"
+    source, target = draft.with_suffix(".c"), draft.with_suffix(".tmp")
+    source.write_text(text, encoding="utf-8")
+    said = _compiled([*command, str(source), "-o", str(target)], build)
+    source.unlink()
+    if said is not None:
+        raise NotImplementedError(f"{command[0]} does not compile the printed functions: {said}")
+    path = folder / f"c_{own}_{hashlib.sha256(target.read_bytes()).hexdigest()[:24]}.so"
+    target.replace(path)
+    return ctypes.CDLL(str(path))
+
+
+def _compiled(command: list[str], build: Build) -> str | None:
+    """What the compiler said if it refused a text; None if it did not."""
+    said = None
+    for options in build.options:
+        done = subprocess.run([*command, *options], capture_output=True, text=True)
+        if done.returncode == 0:
+            return None
+        said = done.stderr.strip()[-2000:]
+    return said
 
 
 def _lasting_folder() -> Path | None:
@@ -123,35 +150,15 @@ def registered(text: str, *functions: tuple[str, str]) -> str:
         functions: a platform of XLA, "cpu" or "CUDA", and the function for it; `loop` on "cpu" if there are none.
 
     Raises:
-        NotImplementedError: no C compiler, or one that refuses the text; no room for temporary files, or none from
-            which programs may run. The message holds what was said.
+        NotImplementedError: as `library`.
     """
-    tool = compiled_by()
-    try:
-        return _compiled(tool, text, functions or (("cpu", "loop"),))
-    except OSError as error:
-        remedy = "Name another folder for temporary files, from which programs may run, in the variable TMPDIR."
-        raise NotImplementedError(f"The printed loop cannot be compiled or loaded here ({error}). {remedy}") from error
+    own, loops = f"jaxdamp_loop_{hashlib.sha256(text.encode()).hexdigest()[:20]}", library(text, LOOP)
+    for where, function in functions or (("cpu", "loop"),):
+        jax.ffi.register_ffi_target(own, jax.ffi.pycapsule(getattr(loops, function)), platform=where)
+    return own
 
 
-def _compiled(tool: str, text: str, functions: Sequence[tuple[str, str]]) -> str:
-    """Compile a text, load it and tell XLA the name of its functions."""
-    own = f"jaxdamp_loop_{hashlib.sha256(text.encode()).hexdigest()[:20]}"
-    source, target = _folder() / f"{own}.c", _folder() / f"{own}.so"
-    source.write_text(text, encoding="utf-8")
-    headers = ["-I", jax.ffi.include_dir(), "-I", str(resources.files("jaxdamp.codegen"))]
-    where = [*headers, str(source), "-o", str(target)]
-    for flags, libraries in (([*_FLAGS, *_WIDE], ["-lmvec", "-lm", "-ldl"]), (_FLAGS, ["-lm"])):
-        done = subprocess.run([tool, *flags, *where, *libraries], capture_output=True, text=True)
-        if done.returncode == 0:
-            library = ctypes.CDLL(str(target))
-            for platform, function in functions:
-                jax.ffi.register_ffi_target(own, jax.ffi.pycapsule(getattr(library, function)), platform=platform)
-            return own
-    raise NotImplementedError(f"{tool} does not compile the printed loop: {done.stderr.strip()[-2000:]}")
-
-
-INSTALL = "Install `nvidia-cuda-nvrtc-cu12`."
+INSTALL = "Install `nvidia-cuda-nvrtc-cu12`, or `nvidia-cuda-nvrtc` for CUDA 13."
 VERBOSE = b"--ptxas-options=-v"  # says registers and spills
 
 
@@ -212,7 +219,7 @@ def compiler_for(architecture: int) -> Compiler:
         for_driver = f" and a driver of CUDA {driver[0]}.{driver[1]}" if driver else ""
         raise NotImplementedError(
             f"No NVRTC, the compiler of CUDA, for sm_{architecture}{for_driver}: {here}. {INSTALL}"
-        )
+        ) from FileNotFoundError("libnvrtc.so")
     return max(suiting, key=lambda c: c.version)
 
 

@@ -19,9 +19,7 @@ from jaxdamp.codegen._native import compiled_by, on_gpu, registered, registered_
 Lanes: TypeAlias = Sequence[bool]  # whether each array has one number, or array, for each point
 
 
-def printed_scan(
-    step: Callable[[PyTree, PyTree], PyTree], carry: PyTree, rows: PyTree, *, arithmetic: bool = False
-) -> PyTree:
+def printed_scan(step: Callable[[PyTree, PyTree], PyTree], carry: PyTree, rows: PyTree) -> PyTree:
     """The carry after `carry = step(carry, row)` for each row, printed as C, for `jax.vmap` over many points.
 
     Points run side by side in vectors. What does not depend on the point, or not on the step, is computed once. The
@@ -31,7 +29,6 @@ def printed_scan(
         step: of numbers and small arrays in double precision; loops and branches inside it run on GPUs only.
         carry: a tree of arrays.
         rows: a tree of arrays, one row for each step along the first axis.
-        arithmetic: refuse a step with functions such as exponentials, which are faster in XLA.
 
     Raises:
         NotImplementedError: what cannot be printed, other types than float64, no C compiler, for GPUs no NVRTC,
@@ -39,10 +36,10 @@ def printed_scan(
     """
     carry, rows = jax.tree.map(jnp.asarray, (carry, rows))
     row = jax.tree.map(lambda x: jax.ShapeDtypeStruct(x.shape[1:], x.dtype), rows)
-    with printing():
+    with printing(vectors=True):
         body, constants = with_constants_as_inputs(step, (carry, row))
     start, tree = jax.tree.flatten(carry)
-    scan = _Scan(body, [known(value) for value in constants], arithmetic)
+    scan = _Scan(body, [known(value) for value in constants])
     traced = [c for c, value in zip(constants, scan.values, strict=True) if value is None]
     for leaf in [*traced, *start, *jax.tree.leaves(rows)]:
         if leaf.dtype != jnp.float64:
@@ -58,7 +55,6 @@ class _Scan:
 
     body: ClosedJaxpr  # a step: constants, carry and row to carry
     values: list[np.ndarray | None]  # of the constants; None of those that JAX traces
-    arithmetic: bool  # refuse functions such as exponentials
 
     def loop(self, laned: tuple[Lanes, Lanes], traced: list[Array], start: list[Array], rows: list[Array]) -> Loop:
         """The printed loop, where some arrays have one number for each point."""
@@ -66,7 +62,7 @@ class _Scan:
         constants = [next(inputs) if v is None else Operand(v.shape, 0, v) for v in self.values]
         carried = [_operand(value, lane, OF_STEP) for value, lane in zip(start, laned[1], strict=True)]
         of_rows = [Operand(x.shape[1:], OF_STEP) for x in rows]
-        return lanes_in_c(self.body, constants, carried, of_rows, arithmetic=self.arithmetic)
+        return lanes_in_c(self.body, constants, carried, of_rows)
 
     def of_one(self, traced: list[Array], start: list[Array], rows: list[Array]) -> list[Array]:
         """One point: no vectors, so it is left to XLA; what cannot be printed is refused all the same."""

@@ -56,7 +56,9 @@ KERNEL void steps_of_points(const double *restrict shared, const double *restric
         const double *restrict row = rows + step * ROWS;
         (void)row;
 @of_step@
-        {
+        if (@simple@) {
+@of_simple@
+        } else {
 @of_both@
         }
 @next@

@@ -5,6 +5,16 @@
 #include "call.h"
 
 #define LANES 32 /* points of a block, which the compiler turns into vectors */
+#ifdef __AVX512F__
+#define VECTOR 8
+#else
+#define VECTOR 4
+#endif
+/* Over all points of a block, in four vectors side by side. */
+#define IN_TURN                                       \
+    for (int base = 0; base < LANES; base += 4 * VECTOR) \
+        _Pragma("omp simd") for (int lanea = base; lanea < base + VECTOR; lanea++)
+#define OTHERS const int laneb = lanea + VECTOR, lanec = laneb + VECTOR, laned = lanec + VECTOR
 #define ROW(name, count) double name[(count) ? (count) : 1][LANES] __attribute__((aligned(64)))
 
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
@@ -57,9 +67,16 @@ static void run(const double *restrict shared, const double *restrict own_in, co
             const double *restrict row = rows + step * ROWS;
             (void)row;
 @of_step@
-#pragma omp simd
-            for (int lane = 0; lane < LANES; lane++) {
+            if (@simple@) {
+                IN_TURN {
+                    OTHERS;
+@of_simple@
+                }
+            } else {
+                IN_TURN {
+                    OTHERS;
 @of_both@
+                }
             }
 @next@
         }

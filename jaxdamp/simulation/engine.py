@@ -136,7 +136,7 @@ class AbstractEngine(AbstractLawEngine):
         return False
 
     def printed_if_faster(self) -> "AbstractEngine | None":
-        """The engine of a long sweep without derivatives, whose loop may be printed; None if it stays this one."""
+        """The engine of a sweep without derivatives, whose loop may be printed; None if it stays this one."""
         return None
 
     def layout(self, states: int, *, side_by_side: bool) -> MemoryLayout:

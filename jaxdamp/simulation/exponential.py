@@ -9,7 +9,7 @@ and Ostermann, Exponential integrators, Acta Numerica 2010).
 
 import dataclasses
 from collections.abc import Callable
-from typing import Literal, NamedTuple, final
+from typing import NamedTuple, final
 
 import equinox as eqx
 import jax
@@ -195,12 +195,11 @@ class Exponential(AbstractFixedStep):
             if left out, so that every step is stable. The road stays straight between instants.
         printed: print the loop over time as C and let the machine's C compiler (gcc, clang) make vector code of it:
             for a `Ride` in a `sweep` or under `jax.vmap`, in double precision. The numbers are the same to rounding,
-            and on one core of a quiet CPU come 1.3 to 1.6 times as fast for laws of arithmetic and roots
-            (`docs/speed.md`). On a GPU the loop is one CUDA kernel: compiled, and compared as C, but not yet
-            run. Derivatives do not pass. What cannot be printed is refused with the reason (`NotImplementedError`),
-            with "arithmetic" also laws with exponentials, powers and the like. If left out (None), a `sweep` that has a
-            minute and more to go tries the loop of XLA and a printed one, and goes on with the faster; with False all
-            is left to XLA.
+            and come 1 to 12 times as fast (`docs/speed.md`). On a GPU the loop is one CUDA kernel, 4 to 40 times as
+            fast as XLA there. Derivatives do not pass. What cannot be printed, such as laws with loops of their own on
+            a processor, is refused with the reason (`NotImplementedError`). If left out (None), a `sweep` prints what
+            can be printed, and if it takes more than a minute compares it with the loop of XLA; with False all is left
+            to XLA.
 
     >>> from jaxdamp import roads, simulate, vehicles
     >>> bump = roads.cosine_bump(0.05, start=0.1, duration=0.25)
@@ -210,7 +209,7 @@ class Exponential(AbstractFixedStep):
 
     dt: float | None = eqx.field(static=True, default=None)
     substeps: int | None = eqx.field(static=True, default=None)
-    printed: bool | Literal["arithmetic"] | None = eqx.field(static=True, default=None)
+    printed: bool | None = eqx.field(static=True, default=None)
 
     def __check_init__(self) -> None:
         if self.dt is not None:
@@ -241,14 +240,9 @@ class Exponential(AbstractFixedStep):
         """As asked for."""
         return bool(self.printed)
 
-    @property
-    def prints_arithmetic(self) -> bool:
-        """As asked for."""
-        return self.printed == "arithmetic"
-
     def printed_if_faster(self) -> "Exponential | None":
-        """With laws of arithmetic and roots, if nobody has said."""
-        return dataclasses.replace(self, printed="arithmetic") if self.printed is None else None
+        """Printed, if nobody has said."""
+        return dataclasses.replace(self, printed=True) if self.printed is None else None
 
     @property
     def derivatives(self) -> tuple[Mode, ...]:

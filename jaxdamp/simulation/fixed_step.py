@@ -43,11 +43,6 @@ class AbstractFixedStep(AbstractEngine):
         """Between its steps."""
         return True
 
-    @property
-    def prints_arithmetic(self) -> bool:
-        """Whether a loop with exponentials, powers and the like is refused, where it would be printed."""
-        return False
-
     @abstractmethod
     def stepper(self, equations: Equations, dt: Scalar) -> AbstractStepper:
         """What takes a step of dt [s], made once before the loop."""
@@ -105,7 +100,7 @@ class AbstractFixedStep(AbstractEngine):
         try:
             if jax.tree.leaves(observer.saved(carry[0], carry[1])):
                 raise NotImplementedError("Instants are saved, as `simulate` and metrics of a whole record need them.")
-            return printed_scan(step, carry, rows, arithmetic=self.prints_arithmetic)
+            return printed_scan(step, carry, rows)
         except NotImplementedError as error:
             message = f"{self} cannot print this run: {error} Leave `printed` out: XLA then compiles the loop."
             raise NotImplementedError(message) from error

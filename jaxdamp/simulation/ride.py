@@ -186,7 +186,7 @@ class Ride(eqx.Module):
     def printed_side_by_side(self) -> "Ride | None":
         """The same with its loop printed as C, if the engine allows it, numbers are double and a compiler is at hand.
 
-        A `sweep` that takes long compiles this form too, and keeps the faster of both.
+        A `sweep` without derivatives runs this form; one that takes long compares it with that of XLA.
         """
         engine = self.engine.printed_if_faster()
         if engine is None or self.heights is None or self.heights.dtype != jnp.float64 or compiler() is None:

@@ -65,10 +65,10 @@ class HasSideBySide(Protocol):
 
 @runtime_checkable
 class HasPrinted(Protocol):
-    """A function whose loop can be printed as C, which may be faster."""
+    """A function whose loop can be printed as C, which is faster."""
 
     def printed_side_by_side(self) -> PointFunction | None:
-        """That form, for long sweeps without derivatives on processors; None if XLA is to compile it in any case."""
+        """That form, for sweeps without derivatives; None if XLA is to compile it in any case."""
         ...
 
 

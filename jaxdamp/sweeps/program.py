@@ -61,7 +61,7 @@ def free_memory(mesh: Mesh) -> float:
     return max(min(free), 1e6) / len(devices)
 
 
-ON_CPU, ON_GPU = 256, 65536  # points side by side where nobody says how many
+ON_CPU, ON_GPU = 256, 2**18  # points side by side where nobody says how many
 # Reverse derivatives take one in so many of a run's lanes. A quarter car with a Besinger damper, 10 s at 1 kHz,
 # one core with 16 MB of the last cache, microseconds a car: 302 for 16 lanes, 201 for 32, 672 for 64, 1140 for 128,
 # where a run takes 99, 62, 43 and 62. So a sweep of any size costs what 32 lanes do (`python -m benchmarks.gradients`).

@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import final
 
+import jax
 import numpy as np
 
 from jaxdamp.sweeps.axes import AbstractPoints, Points
@@ -50,7 +51,7 @@ class _Pace:
 class Runner:
     """Takes points through a program, in calls of a useful length; points that raise are found by halving.
 
-    If the sweep takes long, another program of the same function is compiled. Both take calls in turn, and the faster
+    If the sweep takes long and there is another program of the same function, both take calls in turn, and the faster
     one does the rest.
 
     Arguments:
@@ -201,21 +202,30 @@ class Computation:
         return bool(np.all(reasons != ""))
 
     def runner(self, count: int) -> Runner:
-        """Runs calls of about so many points."""
-        program = prepare(self.traced, count, self._chunk, self._devices, _lanes(self.function))
-        return Runner(program, self.points, lambda: self._printed(count))
+        """Runs calls of about so many points, by a printed loop if there is one: as quick to compile, and faster.
+
+        A long sweep compares it with that of XLA, as other work on the machine may turn that round.
+        """
+
+        def compiled() -> Program:
+            return prepare(self.traced, count, self._chunk, self._devices, _lanes(self.function))
+
+        printed = self._printed(count)
+        return Runner(compiled(), self.points) if printed is None else Runner(printed, self.points, compiled)
 
     def _printed(self, count: int) -> Program | None:
         """The program with its loop printed as C, if the function has one that this machine can compile."""
         function, traced = self.function, self.traced
-        on_cpu = choose_devices(self._devices)[0].platform == "cpu"
         printed = function.printed_side_by_side() if isinstance(function, HasPrinted) else None
-        if printed is None or traced.mode is not None or not on_cpu:
+        if printed is None or traced.mode is not None:
             return None
         try:
-            with warnings.catch_warnings(action="ignore"):  # of axes, which were given before
+            with (
+                jax.default_device(choose_devices(self._devices)[0]),  # for which it is printed
+                warnings.catch_warnings(action="ignore"),  # of axes, which were given before
+            ):
                 printed_trace = trace(printed, list(traced.axes), False)._replace(fingerprint=traced.fingerprint)
-            return prepare(printed_trace, count, self._chunk, self._devices, _lanes(printed))
+                return prepare(printed_trace, count, self._chunk, self._devices, _lanes(printed))
         except NotImplementedError as error:
             if _of_machine(error):
                 warnings.warn(f"{error} This sweep goes on with the loop of XLA.", stacklevel=2)

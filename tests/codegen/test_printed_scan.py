@@ -2,6 +2,7 @@
 
 import ctypes
 import re
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,12 +13,13 @@ import pytest
 
 from jaxdamp import Ride, roads, sweep, vehicles
 from jaxdamp.codegen import _lanes, _native, _scan, compiler, printed_scan
-from jaxdamp.dampers import Besinger, BoucWen, Lag, PowerLaw, SeriesSpring
+from jaxdamp.dampers import Besinger, BoucWen, Lag, PiecewiseLinear, PowerLaw, SeriesSpring
 from jaxdamp.simulation import Exponential, simulate
 from jaxdamp.sweeps import running
 
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
+SCANS = printed_scan, lambda step, carry, rows: by_jax(step, carry, rows)
 ROWS = jnp.asarray(np.sin(np.arange(40.0)).reshape(20, 2), float)
 RATE = "damper.rebound_rate"
 
@@ -102,6 +104,35 @@ def test_a_value_at_the_end_of_a_step_is_that_at_the_beginning_of_the_next(monke
     printed, plain = (jax.vmap(lambda rate, scan=scan: run(scan, rate))(rates) for scan in (printed_scan, by_jax))
     assert "KEPT = 1 " in texts[-1]
     jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-12), printed, plain)
+
+
+def test_knees_take_exponentials_only_where_they_are_rounded(monkeypatch):
+    """A choice between numbers in memory is one of two that were read, not of two places."""
+    texts = []
+    monkeypatch.setattr(_scan, "registered", lambda text: (texts.append(text), _native.registered(text))[1])
+
+    def run(scan, rate, width, other):
+        def step(x, row):
+            safe = jnp.where(width > 0.0, width, 1.0)
+            knee = jnp.where(width > 0.0, safe * jnp.log1p(jnp.exp(x / safe)), jnp.maximum(x, 0.0))
+            return 0.5 * x - 0.1 * rate * knee + row[0] * jnp.where(x > 0.0, width, other)
+
+        return scan(step, jnp.asarray(0.3), ROWS)
+
+    rates = jnp.linspace(0.5, 3.0, 40)
+    program = {scan: jax.jit(jax.vmap(partial(run, scan), (0, None, None))) for scan in SCANS}
+    for width in (0.0, 0.2, np.nan):
+        printed, plain = (program[scan](rates, width, 2.0) for scan in SCANS)
+        np.testing.assert_allclose(printed, plain, rtol=1e-12)
+    simple, rounded = re.findall(r"IN_TURN \{(.*?)\n {16}\}", texts[-1], re.DOTALL)
+    assert "exp(" not in simple and "exp(" in rounded and "? loaded0 : loaded1" in simple
+
+
+@pytest.mark.parametrize("law", ["power", "rounded knees"])
+def test_laws_with_functions(law):
+    """Powers are exponentials of logarithms, in vectors."""
+    laws = {"power": PowerLaw(1800.0, 0.55, 900.0, 1.8), "rounded knees": PiecewiseLinear([-0.1], [9e2, 2e3], 0.01)}
+    with_its_loops(laws[law])
 
 
 def test_the_kernel_compiled_as_c(monkeypatch):
@@ -199,7 +230,8 @@ def test_refused_by_name(monkeypatch):
     with pytest.raises(NotImplementedError, match="rows of a loop"):
         jax.vmap(lambda rows: printed_scan(lambda c, row: c + row[0], jnp.asarray(0.0), rows))(jnp.ones((3, 5, 1)))
     with monkeypatch.context() as patched, pytest.raises(NotImplementedError, match=r"loaded here .* TMPDIR"):
-        patched.setattr(_native, "_folder", lambda: Path("/nowhere"))
+        for folder in ("_lasting_folder", "_folder"):
+            patched.setattr(_native, folder, lambda: Path("/nowhere"))
         run(lambda c, row, x: c + 0.321 * row[0] * x, jnp.asarray(0.0))
     monkeypatch.setattr(_native, "compiler", lambda: None)
     with pytest.raises(NotImplementedError, match="No C compiler"):
@@ -217,9 +249,10 @@ def test_a_sweep_of_all_ride_metrics():
         np.testing.assert_allclose(printed[name], plain[name], rtol=1e-11, atol=1e-14, err_msg=str(name))
 
 
-def test_a_long_sweep_tries_the_printed_loop_too(monkeypatch):
+def test_a_sweep_prints_its_loop_and_a_long_one_compares(monkeypatch):
     """With the numbers of XLA, which does all where derivatives, functions or a missing compiler stand in the way."""
-    ride = Ride(CAR, ROAD, metrics=["rms_sprung_acceleration"], duration=0.4)
+    metric = "rms_sprung_acceleration"
+    ride = Ride(CAR, ROAD, metrics=[metric], duration=0.4)
     tried, original = [], running._Pace
 
     class Slow(original):
@@ -231,29 +264,30 @@ def test_a_long_sweep_tries_the_printed_loop_too(monkeypatch):
     def swept(function=ride, **options):
         tried.clear()
         data = sweep(function, {RATE: np.linspace(2e3, 5e3, 20)}, chunk=1, **options)
-        return data, len(tried)
+        return data, len(tried), data.attrs["loop"]
 
-    plain, programs = swept()
-    assert (programs, plain.attrs["loop"]) == (1, "compiled by XLA")  # too short
+    by_xla = Ride(CAR, ROAD, metrics=[metric], duration=0.4, engine=Exponential(printed=False))
+    plain = swept(by_xla)[0]
+    printed, *what = swept()
+    assert what == [1, "printed as C"]
+    np.testing.assert_allclose(printed[metric], plain[metric], rtol=1e-12)
     monkeypatch.setattr(running, "LONG", 0.0)
     monkeypatch.setattr(running, "TURNS", 1)
-    found, programs = swept()
-    assert programs == 2
-    metric = "rms_sprung_acceleration"
-    np.testing.assert_allclose(found[metric], plain[metric], rtol=1e-12)
+    assert swept()[1] == 2
     made = iter((Slow, original))
     with monkeypatch.context() as patched:
         patched.setattr(running, "_Pace", lambda program: next(made)(program))
-        found = swept()[0]
-    assert found.attrs["loop"] == "printed as C"
-    np.testing.assert_allclose(found[metric], plain[metric], rtol=1e-12)
-    powers = vehicles.presets.quarter_car_000(CAR.damper + PowerLaw(1800.0, 0.55, 900.0, 0.55))
-    by_xla = Ride(CAR, ROAD, metrics=[metric], duration=0.4, engine=Exponential(printed=False))
-    assert swept(gradients=True)[1] == swept(by_xla)[1] == 1
-    ride_of_powers = Ride(powers, ROAD, metrics=[metric], duration=0.4)
-    assert len(sweep(ride_of_powers, {"sprung_mass": np.linspace(250.0, 300.0, 9)}, chunk=1)) and len(tried) == 2
+        compared, _, loop = swept()
+    assert loop == "compiled by XLA"
+    np.testing.assert_allclose(compared[metric], plain[metric], rtol=1e-12)
+    xla = [1, "compiled by XLA"]
+    monkeypatch.setattr(running, "LONG", 60.0)
+    assert [*swept(gradients=True)[1:]] == [*swept(by_xla)[1:]] == xla
+    spring = vehicles.presets.quarter_car_000(SeriesSpring(CAR.damper, 1e6, 1e8))  # with loops of its own
+    over = {"damper.stiffness": [1e6, 2e6]}
+    assert sweep(Ride(spring, ROAD, metrics=[metric], duration=0.05), over).attrs["loop"] == xla[1]
     monkeypatch.setattr("jaxdamp.simulation.ride.compiler", lambda: None)
-    assert swept()[1] == 1
+    assert [*swept()[1:]] == xla
 
 
 def test_runs_that_cannot_be_printed():

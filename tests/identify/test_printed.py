@@ -146,9 +146,9 @@ def test_what_was_changed_on_disk_is_not_loaded(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(_native, "_lasting_folder", lambda: tmp_path)
     text = "double answer(void) { return 42.0; } // "
     _native.library.__wrapped__(text)
-    (kept,) = tmp_path.glob("fit_*.so")
+    (kept,) = tmp_path.glob("c_*.so")
     was = kept.read_bytes()
-    assert _native.library.__wrapped__(text) and list(tmp_path.glob("fit_*.so")) == [kept]
+    assert _native.library.__wrapped__(text) and list(tmp_path.glob("c_*.so")) == [kept]
     kept.unlink()
     kept.write_bytes(was[:-1] + b"!")
     monkeypatch.setattr(_native, "compiler", lambda: None)
