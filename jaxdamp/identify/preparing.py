@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
-from jaxdamp.dampers import Reach
+from jaxdamp.dampers import AbstractDamper, Reach
 from jaxdamp.identify.criteria import FIRST_NOISE, Priors, priors_on
 from jaxdamp.identify.estimated_states import first_states
 from jaxdamp.identify.initial_states import INITIAL_STATES, moving_samples, starts_in_words
@@ -33,7 +34,7 @@ from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.identify.stated import stated_parameters, stated_values, with_stated
 from jaxdamp.identify.traces import batches, owners, places
-from jaxdamp.parameters import free_parameters, match_paths, name_patterns, parameters, with_values
+from jaxdamp.parameters import FreeParameters, free_parameters, match_paths, name_patterns, parameters, with_values
 
 
 FIT_OUTSIDE = "Call it outside `jax.jit`, `jax.grad` and `jax.vmap`; the residuals of a `Problem` can be traced."
@@ -88,43 +89,112 @@ def prepare(
     _checks.untraced("law", law, FIT_OUTSIDE)
     runs = _records(runs)
     sigma = weights(weighting, runs)
+    begin = begun(
+        law,
+        runs,
+        sigma,
+        rig=rig,
+        over=over,
+        freeze=freeze,
+        bounds=bounds,
+        tie=tie,
+        per_record=per_record,
+        priors=priors,
+        initial_state=initial_state,
+    )
+    return begin.problem(runs, sigma, samples_per_cycle, each=weighting == "runs")
+
+
+class Beginning(NamedTuple):
+    """Where fits start."""
+
+    law: AbstractDamper
+    model: Model  # with the machine
+    free: FreeParameters
+    per_record: tuple[str, ...]  # paths of the parameters with a value for each record
+    initial_state: str  # of the records
+    priors: tuple[Priors, ...]  # what is known beforehand, in units of a noise that the records give
+
+    def problem(
+        self, runs: tuple[BenchRun, ...], sigma: Sequence[float], samples_per_cycle: int | None, *, each: bool
+    ) -> Problem:
+        """The problem of records.
+
+        Arguments:
+            runs: the records.
+            sigma: `weights` of them.
+            samples_per_cycle: as in `fit`.
+            each: whether every record has its own noise level.
+        """
+        how = (samples_per_cycle, self.per_record, self.initial_state)
+        residuals, ranges = batches(self.model, runs, sigma, *how)
+        weighted = (np.asarray(part.force) * np.asarray(part.weight) for part in residuals)
+        level = float(np.sqrt(sum(np.sum(np.square(force)) for force in weighted)))
+        fitted_to = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
+        reach = Reach(0.5 * max(float(np.ptp(r.stroke)) for r in fitted_to), max(r.peak_velocity for r in fitted_to))
+        owner = owners(residuals, ranges)
+        noise = FIRST_NOISE * level / np.sqrt(max(sum(np.count_nonzero(part.used()) for part in residuals), 1))
+        priors = tuple(replace(prior, noise=jnp.asarray(noise)) for prior in self.priors)
+        return Problem(
+            free=self.free,
+            residuals=(*residuals, *priors),
+            level=level,
+            runs=runs,
+            sigma=tuple(sigma),
+            owner=np.concatenate([owner, *(np.zeros(part.size, owner.dtype) for part in priors)]),
+            reach=reach,
+            law=self.law,
+            per_record=self.per_record,
+            each=each,
+            sample_steps=tuple(at.block / run.sampling_rate for at, run in zip(ranges, runs, strict=True)),
+            places=places(residuals, ranges),
+            initial_state=self.initial_state,
+        )
+
+
+def begun(
+    law: Start,
+    runs: Sequence[BenchRun],
+    sigma: Sequence[float],
+    *,
+    rig: Machine,
+    over: Sequence[str] | None = None,
+    freeze: Sequence[str],
+    bounds: Mapping[str, tuple[float, float]] | None,
+    tie: Mapping[str, str] | None,
+    per_record: Sequence[str] = (),
+    priors: Mapping[str, tuple[float, float]] | None,
+    initial_state: str,
+    mentioned: Iterable[str] = (),
+) -> Beginning:
+    """The start that some records give.
+
+    Arguments:
+        law: as in `fit`, as all that is not named here.
+        runs: the records.
+        sigma: `weights` of them.
+        mentioned: further names that the call mentions.
+    """
     fitted_to = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
-    mentioned = [*name_patterns("per_record", per_record), *(bounds or ()), *(priors or ()), *(tie or {})]
-    begin, machine, held = started_on(law, fitted_to, rig, mentioned)
+    named = [*mentioned, *name_patterns("per_record", per_record), *(bounds or ()), *(priors or ()), *(tie or {})]
+    begin, machine, held = started_on(law, fitted_to, rig, named)
     model, absent = on_rig(begin, machine), [*absent_paths(machine), *held]
     initial_state = initial_state_for(model, initial_state)
     expected: tuple[Priors, ...] = ()
     if initial_state == "estimated":
         model, expected, unfitted = _with_estimated_states(model, runs, sigma)
         absent = [*absent, *unfitted]
-    named = own_names(model)
+    names = own_names(model)
     stated = stated_values(model, runs)
     model = with_stated(model, stated_parameters(model, fitted_to))
-    own = _per_record(model, named.find("per_record", per_record), sigma, absent, stated)
-    left = not_chosen(model, over, "rig.", STARTS)
-    frozen = [*named.find("freeze", freeze), *named.find("freeze", frozen_by(law)), *absent, *left]
-    frozen += [p.path for p in parameters(model) if p.path in stated]
-    bounds, priors, tie = (
-        named.find_keys("bounds", bounds),
-        named.find_keys("priors", priors),
-        named.find_keys("tie", tie),
-    )
-    free = free_parameters(_spread(model, own, len(runs)), freeze=frozen, bounds=bounds, tie=tie)
+    own = _per_record(model, names.find("per_record", per_record), sigma, absent, stated)
+    frozen = [*names.find("freeze", freeze), *names.find("freeze", frozen_by(law)), *absent]
+    frozen += [*not_chosen(model, over, "rig.", STARTS), *(p.path for p in parameters(model) if p.path in stated)]
+    limits, tied = names.find_keys("bounds", bounds), names.find_keys("tie", tie)
+    free = free_parameters(_spread(model, own, len(runs)), freeze=frozen, bounds=limits, tie=tied)
     _checks.finite("law", free.values)
-    residuals, ranges = batches(model, runs, sigma, samples_per_cycle, own, initial_state)
-    owner = owners(residuals, ranges)
-    weighted = (np.asarray(part.force) * np.asarray(part.weight) for part in residuals)
-    level = float(np.sqrt(sum(np.sum(np.square(force)) for force in weighted)))
-    reach = Reach(0.5 * max(float(np.ptp(r.stroke)) for r in fitted_to), max(r.peak_velocity for r in fitted_to))
-    noise = FIRST_NOISE * level / np.sqrt(max(np.count_nonzero(owner >= 0), 1))
-    known = (*priors_on(free, priors or {}, noise), *(replace(prior, noise=jnp.asarray(noise)) for prior in expected))
-    owner = np.concatenate([owner, *(np.zeros(part.size, owner.dtype) for part in known)])
-    steps = tuple(at.block / run.sampling_rate for at, run in zip(ranges, runs, strict=True))
-    each, sigma = weighting == "runs", tuple(sigma)
-    where = places(residuals, ranges)
-    return Problem(
-        free, (*residuals, *known), level, runs, sigma, owner, reach, begin, own, each, steps, where, initial_state
-    )
+    known = priors_on(free, names.find_keys("priors", priors) or {}, 1.0)
+    return Beginning(begin, model, free, own, initial_state, (*known, *expected))
 
 
 def _records(runs: BenchRun | Iterable[BenchRun]) -> tuple[BenchRun, ...]:
