@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from jaxdamp._triangles import rows_of_products
 from jaxdamp.dampers import laws_inside, margins
@@ -25,6 +25,7 @@ class Here(NamedTuple):
     """The problem of a damper at a point."""
 
     whole: Float[np.ndarray, "samples columns"]  # the Jacobian of the weighted residual, which is the last column
+    counted: list[Float[np.ndarray, "rows columns"]]  # of it
     margins: Float[np.ndarray, " conditions"]  # of the conditions between parameters
     slopes: Float[np.ndarray, "conditions free"]
     drift: (
@@ -32,32 +33,24 @@ class Here(NamedTuple):
     )  # largest relative change of the states over the cycle before a record that starts periodically
 
 
-def _batches(problem: Problem) -> list[Batch]:
-    return [part for part in problem.residuals if isinstance(part, Batch)]
-
-
-def forces_and_weights(problem: Problem) -> list[Float[np.ndarray, " samples"]]:
-    """The measured forces [N] of the records, and the weights, as they stand in the residuals."""
-    return [
-        np.concatenate([np.ravel(getattr(batch, name)) for batch in _batches(problem)]) for name in ("force", "weight")
-    ]
-
-
 class ByXla:
     """An `Evaluator` of a problem by XLA: one program for all records of a length, whatever damper they are of."""
 
     def __init__(self, problem: Problem) -> None:
         self._free, self._beside = problem.free, rows_beside(problem.free, problem.residuals)
-        self._rows = [_record(batch, k) for batch in _batches(problem) for k in range(len(batch.dt))]
+        self._rows = [
+            _record(batch, k) for batch in problem.residuals if isinstance(batch, Batch) for k in range(len(batch.dt))
+        ]
 
     def here(self, values: Float[np.ndarray, " free"]) -> Here:
         """The problem at physical values."""
         at = jnp.asarray(values, self._free.values.dtype)
-        each = [Here(*map(np.asarray, _evaluated(self._free, at, row))) for row in self._rows]
+        each = [_evaluated(self._free, at, row) for row in self._rows]
         beside = self._beside.copy()
         beside[:, -1] += beside[:, :-1] @ values
-        whole = np.concatenate([*(row.whole for row in each), beside]).astype(np.float64)
-        return Here(whole, each[0].margins, each[0].slopes, float(max(row.drift for row in each)))
+        whole = np.concatenate([*(np.asarray(rows, np.float64) for rows, *_ in each), beside])
+        _, of_law, slopes, _ = map(np.asarray, each[0])
+        return Here(whole, [whole], of_law, slopes, max(float(drift) for *_, drift in each))
 
 
 def _record(batch: Batch, row: int) -> Batch:
@@ -88,7 +81,7 @@ class Lanes(NamedTuple):
     evaluators: tuple[Evaluator | ByXla, ...]
     damper: Int[np.ndarray, " lanes"]  # the damper of each lane
     levels: Float[np.ndarray, " dampers"]  # size of the force of each damper, root of the weighted sum of squares
-    samples: Float[np.ndarray, " dampers"]  # of each damper, that count
+    used: tuple[Bool[np.ndarray, " samples"], ...]  # which samples of each damper count
 
     @classmethod
     def of(cls, problems: Iterable[Problem]) -> "Lanes":
@@ -97,8 +90,7 @@ class Lanes(NamedTuple):
         free = problems[0].free
         each = evaluators(free, [p.residuals for p in problems]) if free.values.dtype == np.float64 else []
         levels = np.array([problem.level for problem in problems])
-        samples = np.array([float(np.count_nonzero(problem.used)) for problem in problems])
-        how = (tuple(each or map(ByXla, problems)), np.arange(len(problems)), levels, samples)
+        how = (tuple(each or map(ByXla, problems)), np.arange(len(problems)), levels, tuple(p.used for p in problems))
         return cls(problems[0].coordinates, problems, *how)
 
     def here(self, damper: int, values: Float[np.ndarray, " free"]) -> Here:
@@ -106,7 +98,8 @@ class Lanes(NamedTuple):
         evaluator = self.evaluators[damper]
         if isinstance(evaluator, ByXla):
             return evaluator.here(values)
-        return Here(evaluator(values), *evaluator.margins(values), 0.0)
+        whole = evaluator(values)
+        return Here(whole, evaluator.counted(whole), *evaluator.margins(values), 0.0)
 
     def linearise(
         self, y: Float[np.ndarray, "some free"], lanes: Int[np.ndarray, " some"]
@@ -122,11 +115,12 @@ class Lanes(NamedTuple):
         products = np.zeros(to_columns.shape)
         for k, damper in enumerate(dampers):
             here = self.here(damper, values[k])
-            products[k] = here.whole.T @ here.whole / self.levels[damper] ** 2
+            products[k] = sum(rows.T @ rows for rows in here.counted) / self.levels[damper] ** 2
             each.append((here.margins, here.slopes @ slopes[k]))
         products = to_columns.transpose(0, 2, 1) @ products @ to_columns
+        samples = np.array([float(np.count_nonzero(self.used[damper])) for damper in dampers])
         of_law, by_y = map(np.stack, zip(*each, strict=True))
-        return Linearisation(rows_of_products(products), of_law, by_y, self.samples[dampers]), products
+        return Linearisation(rows_of_products(products), of_law, by_y, samples), products
 
     def physical(
         self, y: Float[np.ndarray, "some free"]
@@ -139,25 +133,28 @@ class Lanes(NamedTuple):
         values, slopes = map(np.stack, zip(*map(host, y), strict=True))
         return values, slopes
 
+    def of_records(self, damper: int, signal: Float[np.ndarray, " samples"]) -> list[Float[np.ndarray, " used"]]:
+        """A signal like the residuals of a damper at the samples of each record that count."""
+        used = self.used[damper]
+        return [signal[place][used[place]] for place in self.problems[damper].places]
+
+    def noise(self, damper: int, residual: Float[np.ndarray, " samples"], free: float) -> float:
+        """Standard deviation of the weighted residual of a damper, larger where it is correlated.
+
+        Arguments:
+            damper: its number.
+            residual: weighted.
+            free: count of free numbers.
+        """
+        parts = self.of_records(damper, residual)
+        squares = sum(float(part @ part) for part in parts) / max(sum(part.size for part in parts) - free, 1)
+        alike = correlation_time(parts)
+        return self.problems[damper].noise_factor * float(np.sqrt(squares * (alike if alike > CORRELATED else 1.0)))
+
 
 @eqx.filter_jit
 def _physical(coordinates: Coordinates, y: Float[Array, "lanes free"]) -> tuple[Array, Array]:
     return jax.vmap(coordinates.to_physical)(y), jax.vmap(jax.jacfwd(coordinates.to_physical))(y)
-
-
-def noise_level(problem: Problem, residual: Float[np.ndarray, " samples"], free: float) -> float:
-    """Standard deviation of the weighted residual of a damper, larger where it is correlated.
-
-    Arguments:
-        problem: of the damper.
-        residual: weighted.
-        free: count of free numbers.
-    """
-    used = problem.used
-    parts = [residual[place][used[place]] for place in problem.places]
-    squares = sum(float(part @ part) for part in parts) / max(sum(part.size for part in parts) - free, 1)
-    alike = correlation_time(parts)
-    return problem.noise_factor * float(np.sqrt(squares * (alike if alike > CORRELATED else 1.0)))
 
 
 def by_rounds(
@@ -181,7 +178,7 @@ def by_rounds(
         noise, values = np.ones(len(y)), plain.physical(y)[0]
         for i in np.flatnonzero(moving):
             residual = lanes.here(int(i), values[i]).whole[:, -1]
-            noise[i] = noise_level(rounds[i].problem, residual, free)
+            noise[i] = lanes.noise(int(i), residual, free)
             after = rounds[i].after(plain.problems[i], residual, noise[i], loss)
             moving[i], rounds[i] = after is not None, after or rounds[i]
         if not np.any(moving):

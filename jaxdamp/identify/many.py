@@ -19,7 +19,7 @@ from jaxdamp.dampers import AbstractDamper, Reach
 from jaxdamp.identify.criteria import LOSSES, Priors
 from jaxdamp.identify.dependence import OWN, Dependence, Products, dependence
 from jaxdamp.identify.initial_states import INITIAL_STATES
-from jaxdamp.identify.lanes import Lanes, by_rounds, forces_and_weights, noise_level
+from jaxdamp.identify.lanes import Lanes, by_rounds
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import Machine
 from jaxdamp.identify.many_blocks import fit_into_store
@@ -36,7 +36,7 @@ from jaxdamp.identify.model import initial_state_for, own_names, rig_of
 from jaxdamp.identify.preparing import Beginning, weights
 from jaxdamp.identify.several import other_starts
 from jaxdamp.identify.starting import Start
-from jaxdamp.identify.stated import followed_channels, stated_values
+from jaxdamp.identify.traces import Batch
 from jaxdamp.parameters import FreeParameters, name_patterns
 from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, SearchLanes, least_squares_on_host
 
@@ -171,14 +171,9 @@ def fitted_together(
             remedy = "Leave out `shared`, or take another `initial_state`."
             _checks.refuse("initial_state", "be the same for dampers that share parameters", "'estimated'", remedy)
         return many(**_one_by_one(records, begin.law, free, how))
-    together = [run for runs in records for run in runs]
-    stated_values(begin.model, together)  # refuses dampers of which only some state what the law takes
-    followed_channels(begin.model, together)
     start = begin._replace(initial_state=initial_state, priors=_once(begin.priors, free, depends))
-    cycle, by_runs = options["samples_per_cycle"], options["weighting"] == "runs"
-    problems = [
-        start.problem(runs, weights(options["weighting"], runs), cycle, each=by_runs) for runs in dampers.values()
-    ]
+    sigma, by_runs = [weights(options["weighting"], runs) for runs in records], options["weighting"] == "runs"
+    problems = start.problems(records, sigma, options["samples_per_cycle"], each=by_runs)
     how_far = options["loss"], options["starts"], options["max_steps"]
     return many(dependence=depends, **_side_by_side(Lanes.of(problems), records, depends, *how_far))
 
@@ -303,15 +298,15 @@ def _judged(lanes: Lanes, end: SearchLanes, depends: Dependence | None) -> dict[
     for i, problem in enumerate(lanes.problems):
         here = lanes.here(i, values[i])
         residual, drift[i] = here.whole[:, -1], here.drift
-        force, weight = forces_and_weights(problem)
-        errors = np.where(weight > 0, residual[: weight.size] / np.where(weight > 0, weight, 1.0), np.nan)
-        by_record.append(np.array([np.sqrt(np.nanmean(errors[place] ** 2)) for place in problem.places]))
-        rmse[i] = np.sqrt(np.nanmean(errors**2))
-        measured = force[weight > 0]
-        spread = np.linalg.norm(measured - measured.mean())
-        percent[i] = 100.0 * (1.0 - rmse[i] * np.sqrt(measured.size) / spread) if spread > 0 else -np.inf
-        of_fit = free if depends is None else depends.size / count
-        noise[i] = (noise_level(problem, residual, of_fit) / problem.level) ** 2
+        batches = [part for part in problem.residuals if isinstance(part, Batch)]
+        signals = (np.concatenate([np.ravel(getattr(b, name)) for b in batches]) for name in ("weight", "force"))
+        missed, weight, force = (lanes.of_records(i, signal) for signal in (residual, *signals))
+        errors = [part / root for part, root in zip(missed, weight, strict=True)]
+        by_record.append(np.array([np.sqrt(np.mean(part**2)) for part in errors]))
+        together, measured = np.concatenate(errors), np.concatenate(force)
+        rmse[i], spread = np.sqrt(np.mean(together**2)), np.linalg.norm(measured - measured.mean())
+        percent[i] = 100.0 * (1.0 - np.linalg.norm(together) / spread) if spread > 0 else -np.inf
+        noise[i] = (lanes.noise(i, residual, free if depends is None else depends.size / count) / problem.level) ** 2
     errors_of_numbers = _standard_errors(end, slopes, depends, noise)
     named = {"standard_errors": errors_of_numbers, "fit_percent": percent, "rmse": rmse}
     return named | {"record_rmse": tuple(by_record), "drift": drift}

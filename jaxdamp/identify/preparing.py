@@ -33,7 +33,7 @@ from jaxdamp.identify.model import (
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.identify.stated import stated_parameters, stated_values, with_stated
-from jaxdamp.identify.traces import batches, owners, places
+from jaxdamp.identify.traces import Batch, SampleRange, batches_of_each, owners, places
 from jaxdamp.parameters import FreeParameters, free_parameters, match_paths, name_patterns, parameters, with_values
 
 
@@ -102,7 +102,7 @@ def prepare(
         priors=priors,
         initial_state=initial_state,
     )
-    return begin.problem(runs, sigma, samples_per_cycle, each=weighting == "runs")
+    return begin.problems([runs], [sigma], samples_per_cycle, each=weighting == "runs")[0]
 
 
 class Beginning(NamedTuple):
@@ -115,26 +115,44 @@ class Beginning(NamedTuple):
     initial_state: str  # of the records
     priors: tuple[Priors, ...]  # what is known beforehand, in units of a noise that the records give
 
-    def problem(
-        self, runs: tuple[BenchRun, ...], sigma: Sequence[float], samples_per_cycle: int | None, *, each: bool
-    ) -> Problem:
-        """The problem of records.
+    def problems(
+        self,
+        dampers: Sequence[tuple[BenchRun, ...]],
+        sigma: Sequence[Sequence[float]],
+        samples_per_cycle: int | None,
+        *,
+        each: bool,
+    ) -> tuple[Problem, ...]:
+        """The problem of the records of each damper.
 
         Arguments:
-            runs: the records.
+            dampers: their records.
             sigma: `weights` of them.
             samples_per_cycle: as in `fit`.
             each: whether every record has its own noise level.
         """
         how = (samples_per_cycle, self.per_record, self.initial_state)
-        residuals, ranges = batches(self.model, runs, sigma, *how)
+        of_dampers = zip(dampers, sigma, batches_of_each(self.model, dampers, sigma, *how), strict=True)
+        return tuple(self._problem(runs, s, *made, each) for runs, s, made in of_dampers)
+
+    def _problem(
+        self,
+        runs: tuple[BenchRun, ...],
+        sigma: Sequence[float],
+        residuals: tuple[Batch, ...],
+        ranges: Sequence[SampleRange],
+        each: bool,
+    ) -> Problem:
         weighted = (np.asarray(part.force) * np.asarray(part.weight) for part in residuals)
         level = float(np.sqrt(sum(np.sum(np.square(force)) for force in weighted)))
         fitted_to = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
         reach = Reach(0.5 * max(float(np.ptp(r.stroke)) for r in fitted_to), max(r.peak_velocity for r in fitted_to))
         owner = owners(residuals, ranges)
-        noise = FIRST_NOISE * level / np.sqrt(max(sum(np.count_nonzero(part.used()) for part in residuals), 1))
-        priors = tuple(replace(prior, noise=jnp.asarray(noise)) for prior in self.priors)
+        priors = self.priors
+        if priors:
+            count = sum(np.count_nonzero(part.used()) for part in residuals)
+            noise = jnp.asarray(FIRST_NOISE * level / np.sqrt(max(count, 1)))
+            priors = tuple(replace(prior, noise=noise) for prior in priors)
         return Problem(
             free=self.free,
             residuals=(*residuals, *priors),

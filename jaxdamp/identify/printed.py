@@ -118,10 +118,13 @@ class Evaluator:
             out[place : place + len(shown)] = row.missed(shown)
         return out
 
+    def counted(self, out: Float[np.ndarray, "samples columns"]) -> list[Float[np.ndarray, "rows columns"]]:
+        """The rows of each record without samples after the last used, and those beside the records."""
+        return [*(out[place : place + row.used] for place, row, _, _ in self.rows), out[self.size :]]
+
     def triangle(self, out: Float[np.ndarray, "samples columns"]) -> Float[np.ndarray, "rows columns"]:
-        """Rows with the same products of columns: the triangles of the records, without samples after the last used."""
-        each = [triangle(out[place : place + row.used]) for place, row, _, _ in self.rows]
-        return np.concatenate([*each, out[self.size :]])
+        """Rows with the same products of columns: the triangles of the records."""
+        return np.concatenate([triangle(rows) for rows in self.counted(out)])
 
     def margins(
         self, values: Float[np.ndarray, " free"]
@@ -162,7 +165,8 @@ def evaluators(free: FreeParameters, problems: Sequence[Sequence[AbstractResidua
     model, taken = free.build(free.values), _taken(free)  # with the values that are tied to others
     common = numbers_on_rig(model), numbers_on_rig(taken, _blank(plain_rig()))
     each = [_with_numbers(residuals, model, taken, common) for residuals in problems]
-    marked = {id(numbers): numbers for records in each for *_, numbers in records}.values()
+    unique = {id(numbers): numbers for records in each for _, *both in records for numbers in both}
+    marked = [unique[key] for key in {id(taken) for records in each for *_, taken in records}]
     first = next((numbers for records in each for _, numbers, _ in records), None)
     if first is None:
         return []
@@ -171,20 +175,20 @@ def evaluators(free: FreeParameters, problems: Sequence[Sequence[AbstractResidua
         return []
     ends, numbers = np.cumsum([array.size for array in first.arrays]), np.arange(first.flat.size)
     derivatives = np.concatenate([numbers[:0], *(numbers[ends[i] - first.arrays[i].size : ends[i]] for i in law.free)])
+    flat = {key: one.flat for key, one in unique.items()}
     made = []
     for residuals, records in zip(problems, each, strict=True):
-        places = np.cumsum([0, *(row.weight.size for row, *_ in records)]).tolist()
-        rows = [
-            (place, row, numbers.flat, taken.flat.astype(np.int64))
-            for place, (row, numbers, taken) in zip(places[:-1], records, strict=True)
-        ]
-        made.append(Evaluator(law, rows, places[-1], free.values.size, derivatives, rows_beside(free, residuals)))
+        rows, place = [], 0
+        for row, numbers, taken in records:
+            rows.append((place, row, flat[id(numbers)], flat[id(taken)].astype(np.int64)))
+            place += row.weight.size
+        made.append(Evaluator(law, rows, place, free.values.size, derivatives, rows_beside(free, residuals)))
     return made
 
 
 def rows_beside(free: FreeParameters, residuals: Sequence[AbstractResiduals]) -> Float[np.ndarray, "rows columns"]:
     """The `linear_rows` of all residuals that have some."""
-    rows = (part.linear_rows(free) for part in residuals)
+    rows = (part.linear_rows(free) for part in residuals if not isinstance(part, Batch))
     return np.concatenate([np.zeros((0, free.values.size + 1)), *(own for own in rows if own is not None)])
 
 

@@ -238,22 +238,40 @@ def batches(
     Returns:
         The batches, and for each record where it is.
     """
-    fixed, channels = stated_values(model, runs), followed_channels(model, runs)
+    (answer,) = batches_of_each(model, [runs], [sigma], samples_per_cycle, per_record, initial_state)
+    return answer
+
+
+def batches_of_each(
+    model: Model,
+    dampers: Sequence[Sequence[BenchRun]],
+    sigma: Sequence[Sequence[float]],
+    samples_per_cycle: int | None,
+    per_record: tuple[str, ...],
+    initial_state: str,
+) -> list[tuple[tuple[Batch, ...], list[SampleRange]]]:
+    """`batches` of the records of each damper, of which the model takes the same."""
+    together = [run for runs in dampers for run in runs]
+    fixed, channels = stated_values(model, together), followed_channels(model, together)
     rests, effects = can_rest(model), effects_of(model)
+    if not (rests or effects or fixed or per_record):
+        return [_memoryless_batch(*of, samples_per_cycle, channels) for of in zip(dampers, sigma, strict=True)]
     if not rests:
         initial_state = ("warm_up" if initial_state == "estimated" else initial_state) if effects else "rest"
-    if not (rests or effects or fixed or per_record):
-        return _memoryless_batch(runs, sigma, samples_per_cycle, channels)
     angle = min([law_of(model).traits().step_angle, *[LAG_ANGLE] * ("lag" in effects)])
-    how = (samples_per_cycle, model, angle, rests, channels, initial_state)
-    rows = [row_of(run, s, *how, number) for number, (run, s) in enumerate(zip(runs, sigma, strict=True))]
-    groups, ranges = _grouped(rows), dict[int, SampleRange]()
-    for number, group in enumerate(groups):
-        for k, i in enumerate(group):
-            ranges[i] = SampleRange(number, k, rows[i].warm_up, len(rows[i].weight), rows[i].block)
-    members = [([rows[i] for i in group], [runs[i] for i in group]) for group in groups]
-    made = tuple(_batch(*of, fixed, per_record, effects, channels) for of in members)
-    return made, [ranges[i] for i in range(len(runs))]
+    how, each, first = (samples_per_cycle, model, angle, rests, channels, initial_state), [], 0
+    for runs, deviations in zip(dampers, sigma, strict=True):
+        rows = [row_of(run, s, *how, number) for number, (run, s) in enumerate(zip(runs, deviations, strict=True))]
+        groups, ranges = _grouped(rows), dict[int, SampleRange]()
+        for number, group in enumerate(groups):
+            for k, i in enumerate(group):
+                ranges[i] = SampleRange(number, k, rows[i].warm_up, len(rows[i].weight), rows[i].block)
+        own = {path: values[first : first + len(runs)] for path, values in fixed.items()}
+        members = [([rows[i] for i in group], [runs[i] for i in group]) for group in groups]
+        made = tuple(_batch(*of, own, per_record, effects, channels) for of in members)
+        each.append((made, [ranges[i] for i in range(len(runs))]))
+        first += len(runs)
+    return each
 
 
 def places(made: Sequence[Batch], ranges: Sequence[SampleRange]) -> tuple[slice, ...]:
