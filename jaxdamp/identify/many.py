@@ -4,7 +4,6 @@ import dataclasses
 import functools
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -19,7 +18,7 @@ from jaxdamp.dampers import AbstractDamper, Reach
 from jaxdamp.identify.criteria import LOSSES, Priors
 from jaxdamp.identify.dependence import OWN, Dependence, Products, dependence
 from jaxdamp.identify.initial_states import INITIAL_STATES
-from jaxdamp.identify.lanes import Lanes, by_rounds
+from jaxdamp.identify.lanes import Lanes, by_rounds, judged
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import Machine
 from jaxdamp.identify.many_blocks import fit_into_store
@@ -36,12 +35,10 @@ from jaxdamp.identify.model import initial_state_for, own_names, rig_of
 from jaxdamp.identify.preparing import Beginning, weights
 from jaxdamp.identify.several import other_starts
 from jaxdamp.identify.starting import Start
-from jaxdamp.identify.traces import Batch
 from jaxdamp.parameters import FreeParameters, name_patterns
 from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, SearchLanes, least_squares_on_host
 
 
-BLIND = 1e-12  # eigenvalue of JᵀJ, relative to the largest, below which a direction changes no force
 STARTED_FROM = 12  # dampers whose records give the start of a law class
 
 
@@ -202,8 +199,7 @@ def _side_by_side(
     )
     if depends is not None:
         vector = depends.start(end.y)
-    return _judged(lanes, end, depends) | {
-        "values": lanes.physical(end.y)[0],
+    return judged(lanes, end, depends) | {
         "status": tuple(end.status),
         "steps": end.steps,
         "vector": vector,
@@ -251,12 +247,12 @@ def _with_other_starts(
     lanes: Lanes, records: Sequence[Sequence[BenchRun]], starts: int
 ) -> tuple[Lanes, Float[np.ndarray, "lanes free"]]:
     """A lane for every start of every damper, and the coordinates to start from."""
-    free, together = lanes.coordinates.free, [run for runs in records for run in runs]
+    free, together = lanes.searches[0].coordinates.free, [run for runs in records for run in runs]
     begin = [np.asarray(free.values)]
     if starts > 1:
         reach = Reach(0.5 * max(float(np.ptp(r.stroke)) for r in together), max(r.peak_velocity for r in together))
         begin += other_starts(free, reach)[: starts - 1]
-    coordinates = np.array([lanes.coordinates.from_physical(values) for values in begin], np.float64)
+    coordinates = np.array([lanes.searches[0].coordinates.from_physical(values) for values in begin], np.float64)
     dampers = np.arange(len(records))
     return lanes._replace(damper=dampers.repeat(len(begin))), np.tile(coordinates, (len(records), 1))
 
@@ -265,7 +261,10 @@ def _solved(
     lanes: Lanes, begin: Float[np.ndarray, "lanes free"], depends: Dependence | None, max_steps: int
 ) -> tuple[SearchLanes, np.ndarray, np.ndarray | None]:
     """The ends of all lanes, the best lane of each damper, and the vector of shared parameters."""
-    bounds, precision = lanes.coordinates.bounds(), float(jnp.finfo(lanes.coordinates.free.values.dtype).eps)
+    bounds, precision = (
+        lanes.searches[0].coordinates.bounds(),
+        float(jnp.finfo(lanes.searches[0].coordinates.free.values.dtype).eps),
+    )
     if depends is None:
         dampers = np.unique(lanes.damper)
         solver = BoundedLevenbergMarquardt(lower=bounds.lower, upper=bounds.upper, precision=precision)
@@ -287,64 +286,3 @@ def _solved(
     products = np.broadcast_to(end.aux, (count, *end.aux.shape[1:]))
     together = SearchLanes(y, products, end.status * count, end.steps.repeat(count))
     return together, everyone, end.y[0]
-
-
-def _judged(lanes: Lanes, end: SearchLanes, depends: Dependence | None) -> dict[str, Any]:
-    """Errors of each damper and of each of its records, drift, and standard errors of its numbers."""
-    values, slopes = lanes.physical(end.y)
-    count, free = values.shape
-    percent, rmse, drift, noise = (np.zeros(count) for _ in range(4))
-    by_record: list[np.ndarray] = []
-    for i, problem in enumerate(lanes.problems):
-        here = lanes.here(i, values[i])
-        residual, drift[i] = here.whole[:, -1], here.drift
-        batches = [part for part in problem.residuals if isinstance(part, Batch)]
-        signals = (np.concatenate([np.ravel(getattr(b, name)) for b in batches]) for name in ("weight", "force"))
-        missed, weight, force = (lanes.of_records(i, signal) for signal in (residual, *signals))
-        errors = [part / root for part, root in zip(missed, weight, strict=True)]
-        by_record.append(np.array([np.sqrt(np.mean(part**2)) for part in errors]))
-        together, measured = np.concatenate(errors), np.concatenate(force)
-        rmse[i], spread = np.sqrt(np.mean(together**2)), np.linalg.norm(measured - measured.mean())
-        percent[i] = 100.0 * (1.0 - np.linalg.norm(together) / spread) if spread > 0 else -np.inf
-        noise[i] = (lanes.noise(i, residual, free if depends is None else depends.size / count) / problem.level) ** 2
-    errors_of_numbers = _standard_errors(end, slopes, depends, noise)
-    named = {"standard_errors": errors_of_numbers, "fit_percent": percent, "rmse": rmse}
-    return named | {"record_rmse": tuple(by_record), "drift": drift}
-
-
-def _standard_errors(
-    end: SearchLanes,
-    slopes: Float[np.ndarray, "dampers free free"],
-    depends: Dependence | None,
-    noise: Float[np.ndarray, " dampers"],
-) -> Float[np.ndarray, "dampers free"]:
-    """Standard errors of the numbers of each damper.
-
-    Arguments:
-        end: of each damper.
-        slopes: of the numbers by the coordinates.
-        depends: how dampers depend on shared numbers.
-        noise: variance relative to the level of each damper.
-    """
-    products, (count, free) = end.aux, end.y.shape
-    inverse = [_inverse(of_damper[:-1, :-1]) for of_damper in (products if depends is None else products[:1])]
-    errors = np.zeros((count, free))
-    for i in range(count):
-        columns, rows = (np.arange(free), np.eye(free)) if depends is None else depends.rows(i)
-        variances, lost = inverse[i if depends is None else 0]
-        variance = noise[i] if depends is None else float(np.mean(noise))
-        to_values = slopes[i] @ rows
-        covariance = variance * to_values @ variances[np.ix_(columns, columns)] @ to_values.T
-        undetermined = np.any(lost[columns] & (to_values != 0), axis=1)
-        errors[i] = np.where(undetermined, np.inf, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
-    return errors
-
-
-def _inverse(products: Float[np.ndarray, "free free"]) -> tuple[np.ndarray, np.ndarray]:
-    """(JᵀJ)⁻¹ without the directions that change no force, and the numbers that take part in those."""
-    norms = np.sqrt(np.diag(products))
-    scale = np.where(norms > 0, norms, 1.0)
-    squares, directions = np.linalg.eigh(products / np.outer(scale, scale))
-    seen = squares > BLIND * squares[-1]
-    inverse = (directions[:, seen] / squares[seen]) @ directions[:, seen].T
-    return inverse / np.outer(scale, scale), np.sum(directions[:, seen] ** 2, axis=1) < 1.0 - 1e-3

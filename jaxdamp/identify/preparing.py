@@ -123,14 +123,7 @@ class Beginning(NamedTuple):
         *,
         each: bool,
     ) -> tuple[Problem, ...]:
-        """The problem of the records of each damper.
-
-        Arguments:
-            dampers: their records.
-            sigma: `weights` of them.
-            samples_per_cycle: as in `fit`.
-            each: whether every record has its own noise level.
-        """
+        """The problem of the records of each damper with these `weights`, each with a noise level if so stated."""
         how = (samples_per_cycle, self.per_record, self.initial_state)
         of_dampers = zip(dampers, sigma, batches_of_each(self.model, dampers, sigma, *how), strict=True)
         return tuple(self._problem(runs, s, *made, each) for runs, s, made in of_dampers)
@@ -185,14 +178,7 @@ def begun(
     initial_state: str,
     mentioned: Iterable[str] = (),
 ) -> Beginning:
-    """The start that some records give.
-
-    Arguments:
-        law: as in `fit`, as all that is not named here.
-        runs: the records.
-        sigma: `weights` of them.
-        mentioned: further names that the call mentions.
-    """
+    """The start that records with these `weights` give, as in `fit`, and what the call mentions besides."""
     fitted_to = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
     named = [*mentioned, *name_patterns("per_record", per_record), *(bounds or ()), *(priors or ()), *(tie or {})]
     begin, machine, held = started_on(law, fitted_to, rig, named)
