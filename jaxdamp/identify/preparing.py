@@ -33,7 +33,7 @@ from jaxdamp.identify.model import (
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.identify.stated import stated_parameters, stated_values, with_stated
-from jaxdamp.identify.traces import Batch, SampleRange, batches_of_each, owners, places
+from jaxdamp.identify.traces import batches_of_each, owners, places
 from jaxdamp.parameters import FreeParameters, free_parameters, match_paths, name_patterns, parameters, with_values
 
 
@@ -124,43 +124,22 @@ class Beginning(NamedTuple):
         each: bool,
     ) -> tuple[Problem, ...]:
         """The problem of the records of each damper with these `weights`, each with a noise level if so stated."""
-        how = (samples_per_cycle, self.per_record, self.initial_state)
-        of_dampers = zip(dampers, sigma, batches_of_each(self.model, dampers, sigma, *how), strict=True)
-        return tuple(self._problem(runs, s, *made, each) for runs, s, made in of_dampers)
-
-    def _problem(
-        self,
-        runs: tuple[BenchRun, ...],
-        sigma: Sequence[float],
-        residuals: tuple[Batch, ...],
-        ranges: Sequence[SampleRange],
-        each: bool,
-    ) -> Problem:
-        weighted = (np.asarray(part.force) * np.asarray(part.weight) for part in residuals)
-        level = float(np.sqrt(sum(np.sum(np.square(force)) for force in weighted)))
-        fitted_to = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
-        reach = Reach(0.5 * max(float(np.ptp(r.stroke)) for r in fitted_to), max(r.peak_velocity for r in fitted_to))
-        owner = owners(residuals, ranges)
-        priors = self.priors
-        if priors:
-            count = sum(np.count_nonzero(part.used()) for part in residuals)
-            noise = jnp.asarray(FIRST_NOISE * level / np.sqrt(max(count, 1)))
-            priors = tuple(replace(prior, noise=noise) for prior in priors)
-        return Problem(
-            free=self.free,
-            residuals=(*residuals, *priors),
-            level=level,
-            runs=runs,
-            sigma=tuple(sigma),
-            owner=np.concatenate([owner, *(np.zeros(part.size, owner.dtype) for part in priors)]),
-            reach=reach,
-            law=self.law,
-            per_record=self.per_record,
-            each=each,
-            sample_steps=tuple(at.block / run.sampling_rate for at, run in zip(ranges, runs, strict=True)),
-            places=places(residuals, ranges),
-            initial_state=self.initial_state,
-        )
+        how, problems = (samples_per_cycle, self.per_record, self.initial_state), []
+        made = batches_of_each(self.model, dampers, sigma, *how)
+        for runs, deviations, (residuals, ranges) in zip(dampers, sigma, made, strict=True):
+            weighted = (np.asarray(part.force) * np.asarray(part.weight) for part in residuals)
+            level = float(np.sqrt(sum(np.sum(np.square(force)) for force in weighted)))
+            fitted = [run for run, s in zip(runs, deviations, strict=True) if np.isfinite(s)]
+            reach = Reach(0.5 * max(float(np.ptp(r.stroke)) for r in fitted), max(r.peak_velocity for r in fitted))
+            count = sum(np.count_nonzero(part.used()) for part in residuals) if self.priors else 1
+            noise = FIRST_NOISE * level / np.sqrt(max(count, 1))
+            priors = tuple(replace(prior, noise=jnp.asarray(noise)) for prior in self.priors)
+            owner, where = owners(residuals, ranges), places(residuals, ranges)
+            owner = np.concatenate([owner, *(np.zeros(part.size, owner.dtype) for part in priors)])
+            steps = tuple(at.block / run.sampling_rate for at, run in zip(ranges, runs, strict=True))
+            of_records = (level, runs, tuple(deviations), owner, reach, self.law, self.per_record, each, steps, where)
+            problems.append(Problem(self.free, (*residuals, *priors), *of_records, self.initial_state))
+        return tuple(problems)
 
 
 def begun(
