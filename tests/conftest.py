@@ -47,8 +47,9 @@ compiled: Counter[str] = Counter()
 jax.monitoring.register_event_duration_secs_listener(lambda event, *_, **__: compiled.update([event]))
 
 
-# Traced programs are millions of objects, and looking through all of them for cycles takes seconds each time.
-gc.set_threshold(100_000, 20, 100)
+# Traced programs are millions of objects: looking for cycles among the last hundred thousand takes a tenth of a second,
+# among all of them seconds.
+gc.set_threshold(1_000_000, 20, 100)
 
 
 def pytest_configure(config: pytest.Config) -> None:

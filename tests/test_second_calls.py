@@ -122,6 +122,19 @@ def test_of_a_fit_of_other_records(machine):
     assert (first > 0) == (machine == "warming up") and others == [0, 0]  # all else is C
 
 
+@pytest.mark.parametrize("machine", STARTS)
+def test_of_fits_of_other_dampers(machine):
+    def dampers(rate: float) -> dict[str, BenchSet]:
+        laws = {f"{rate + 50.0 * i:g}": Bilinear(rate + 50.0 * i, 900.0) for i in range(round(rate / 500.0))}
+        dynos = {name: bench.VirtualDyno(law, sampling_rate=200.0, force_noise=5.0) for name, law in laws.items()}
+        return {name: dyno.run([SineTest(0.01, 2.0)]) for name, dyno in dynos.items()}
+
+    start, options = Bilinear(1800.0, 1200.0), STARTS[machine]
+    made = [dampers(rate) for rate in (1500.0, 1700.0, 2300.0)]  # three, three and five of them
+    first, *others = in_calls(lambda records: identify.fit_many(start, records, **options).values, made)
+    assert first <= (machine == "warming up") and others == [0, 0]  # all else is C
+
+
 BOUNCE = roads.white("C", 20.0)
 TUNINGS: dict[str, Any] = {
     "minimise": lambda rate: tune.minimise(

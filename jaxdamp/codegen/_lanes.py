@@ -39,6 +39,7 @@ _NAN = constant(np.nan, "float64")
 _SPOILT = ("for (int i = 0; i < STATE; i++)", "    state[i][lane] += missing;")
 WIDTH = 16  # of the printed block in the template
 _VECTORS = "abcd"  # of a block that a step takes in turn, operation by operation: each waits for its own last result
+_LONG = 700  # lines of a step that keep a processor busy with one vector, and a compiler with four for minutes
 
 
 @final
@@ -63,8 +64,9 @@ class Loop(NamedTuple):
         if not self.straight:
             message = "A loop or a branch inside a step cannot be printed for many points side by side."
             raise NotImplementedError(message)
-        in_turn = {name: list(_in_turn(self.parts[name])) for name in ("of_both", "of_simple")}
-        return _filled("lanes.c", self.parts | in_turn)
+        vectors = _VECTORS[: 4 if len(self.parts["of_both"]) <= _LONG else 1]
+        in_turn = {name: list(_in_turn(self.parts[name], vectors)) for name in ("of_both", "of_simple")}
+        return _filled("lanes.c", self.parts | in_turn | {"vectors": str(len(vectors))})
 
     @property
     def kernel(self) -> str:
@@ -314,12 +316,12 @@ def _assigned(pairs: list[tuple[str, str]], *, now: bool) -> list[str]:
     return copies + [f"{target} = after{i};" for i, (target, _) in enumerate(pairs)]
 
 
-def _in_turn(lines: Iterable[str]) -> Iterator[str]:
+def _in_turn(lines: Iterable[str], vectors: str) -> Iterator[str]:
     """Each line for one vector after the other, with names of its own for what it defines."""
     lines = list(lines)
     own = {"lane", *(name for line in lines for name in re.findall(r"^ *const \w+ (\w+)", line))}
     for line in lines:
-        for vector in _VECTORS:
+        for vector in vectors:
             yield re.sub(r"[A-Za-z]\w*", lambda word, v=vector: word[0] + v * (word[0] in own), line)
 
 

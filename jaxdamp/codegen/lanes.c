@@ -10,9 +10,9 @@
 #else
 #define VECTOR 4
 #endif
-/* Over all points of a block, in four vectors side by side. */
+/* Over all points of a block, in one or four vectors side by side. */
 #define IN_TURN                                       \
-    for (int base = 0; base < LANES; base += 4 * VECTOR) \
+    for (int base = 0; base < LANES; base += @vectors@ * VECTOR) \
         _Pragma("omp simd") for (int lanea = base; lanea < base + VECTOR; lanea++)
 #define OTHERS const int laneb = lanea + VECTOR, lanec = laneb + VECTOR, laned = lanec + VECTOR
 #define ROW(name, count) double name[(count) ? (count) : 1][LANES] __attribute__((aligned(64)))

@@ -70,6 +70,19 @@ class Priors(AbstractResiduals):
         """They are no samples of the records."""
         return np.zeros(self.size, bool)
 
+    def linear_rows(self, free: FreeParameters) -> Float[np.ndarray, "rows columns"]:
+        """Weights and means of the numbers."""
+        columns = dict(zip((p.path for p in free.chosen), free.split(np.arange(free.values.size)), strict=True))
+        taken = [np.ravel(columns[path]) for path in self.paths]
+        weights = float(self.noise) / np.asarray(self.deviation)
+        mean, weight = (
+            np.concatenate([np.broadcast_to(np.ravel(a), at.size) for a, at in zip(each, taken, strict=True)])
+            for each in (np.asarray(self.mean), weights)
+        )
+        rows = np.zeros((self.size, free.values.size + 1))
+        rows[np.arange(self.size), np.concatenate(taken)], rows[:, -1] = weight, -weight * mean
+        return rows
+
     def total_weight(self) -> Float[Array, ""]:
         """None of the records."""
         return jnp.zeros(())
@@ -90,6 +103,41 @@ def priors_on(free: FreeParameters, priors: Mapping[str, tuple[float, float]], n
     return (Priors(tuple(chosen), mean, deviation, size, jnp.asarray(noise)),)
 
 
+class Round(NamedTuple):
+    """A round of least squares with weights by a loss."""
+
+    problem: Problem  # with these weights
+    root: Float[np.ndarray, " samples"] | float = 1.0  # of the weight of each sample
+
+    def after(
+        self,
+        plain: Problem,
+        residual: Float[np.ndarray, " samples"],
+        noise: float,
+        loss: str,
+        spread: float | None = None,
+    ) -> "Round | None":
+        """The next round; None where nothing is missed.
+
+        Arguments:
+            plain: the problem without weights by the loss.
+            residual: weighted, at the end of this round.
+            noise: standard deviation of the noise of a weighted sample, for priors.
+            loss: of `LOSSES`.
+            spread: robust standard deviation of the residual without these weights, if it is known.
+        """
+        missed, used = residual / self.root, plain.used
+        unit = 1.0 if loss == "squares" else spread or 1.4826 * float(np.median(np.abs(missed[used])))
+        if not unit > 0:
+            return None
+        relative = missed / unit
+        weight = np.where(used, LOSSES[loss].weight(relative), 1.0)
+        problem = _weighted(plain, np.sqrt(weight), noise)._replace(
+            noise_factor=noise_factor(LOSSES[loss], relative[used]), share_left_out=float(np.mean(weight[used] < HALF))
+        )
+        return Round(problem, np.sqrt(weight))
+
+
 def solve_by(
     problem: Problem,
     solve: Callable[[Problem, int | None], Solution],
@@ -104,33 +152,26 @@ def solve_by(
     Returns:
         The problem of the last round, with its weights, and its solution.
     """
-    plain, solution = problem, solve(problem, starts)
+    solution = solve(problem, starts)
     priors = [part for part in problem.residuals if isinstance(part, Priors)]
     if loss == "squares" and not priors:
         return problem, solution
     rounds = 1 if loss == "squares" and all(part.weak for part in priors) else ROUNDS
-    root = np.ones(solution.best.residual.size)  # of the weight of each sample
+    now = Round(problem)
     for _ in range(rounds):
         best = solution.best
         if not best.finite or problem.is_rounding(best.squares):
             break
-        residual = best.residual / root
-        level = float(np.mean(noise(problem, best).sigma[plain.used]))
-        unit = 1.0 if loss == "squares" else spread or 1.4826 * float(np.median(np.abs(residual[plain.used])))
-        if not unit > 0:
+        level = float(np.mean(noise(now.problem, best).sigma[problem.used]))
+        after = now.after(problem, best.residual, level, loss, spread)
+        if after is None:
             break
-        relative = residual / unit
-        root = np.where(plain.used, np.sqrt(LOSSES[loss].weight(relative)), 1.0)
-        factor = noise_factor(LOSSES[loss], relative[plain.used])
-        problem = _weighted(plain, root, level)._replace(
-            noise_factor=factor, share_left_out=float(np.mean(root[plain.used] ** 2 < HALF))
-        )
-        solution = solve(problem.started_at(best.values), 1)
+        now, solution = after, solve(after.problem.started_at(best.values), 1)
         length = np.linalg.norm(solution.best.jacobian, axis=0)
         moved = np.abs(solution.best.values - best.values) * length
         if np.all(moved < SETTLED * level):
             break
-    return problem, solution
+    return now.problem, solution
 
 
 def noise_factor(loss: Loss, relative: np.ndarray) -> float:

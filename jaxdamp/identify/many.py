@@ -4,13 +4,10 @@ import dataclasses
 import functools
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
@@ -18,16 +15,15 @@ from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun
 from jaxdamp.blocks import Cluster
 from jaxdamp.dampers import AbstractDamper, Reach
-from jaxdamp.identify.criteria import FIRST_NOISE, LOSSES, Priors, priors_on
-from jaxdamp.identify.dependence import OWN, Dependence, dependence
+from jaxdamp.identify.criteria import LOSSES, Priors
+from jaxdamp.identify.dependence import OWN, Dependence, Products, dependence
 from jaxdamp.identify.initial_states import INITIAL_STATES
-from jaxdamp.identify.lanes import Fitted, LanePriors, Lanes, Products, by_rounds, grouped_records, noise_level
+from jaxdamp.identify.lanes import Lanes, by_rounds, judged
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import Machine
 from jaxdamp.identify.many_blocks import fit_into_store
 from jaxdamp.identify.many_records import (
     AllRecords,
-    Beginning,
     Options,
     begun_on,
     by_name,
@@ -36,14 +32,13 @@ from jaxdamp.identify.many_records import (
 )
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.model import initial_state_for, own_names, rig_of
-from jaxdamp.identify.preparing import weights
+from jaxdamp.identify.preparing import Beginning, weights
 from jaxdamp.identify.several import other_starts
 from jaxdamp.identify.starting import Start
-from jaxdamp.parameters import Coordinates, FreeParameters, name_patterns
+from jaxdamp.parameters import FreeParameters, name_patterns
 from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, SearchLanes, least_squares_on_host
 
 
-BLIND = 1e-12  # eigenvalue of JᵀJ, relative to the largest, below which a direction changes no force
 STARTED_FROM = 12  # dampers whose records give the start of a law class
 
 
@@ -163,10 +158,8 @@ def fitted_together(
         settings: of the dampers.
     """
     free, records = begin.free, tuple(dampers.values())
-    named = own_names(begin.model)
-    priors = named.find_keys("priors", options["priors"])
     degrees = shared if isinstance(shared, Mapping) else dict.fromkeys(name_patterns("shared", shared), 0)
-    depends = dependence(free, named.find_keys("shared", degrees), settings, len(dampers))
+    depends = dependence(free, own_names(begin.model).find_keys("shared", degrees), settings, len(dampers))
     how = {**options, "bad_records": "keep"}
     many = functools.partial(ManyFits, tuple(dampers), records, settings, free=free, options=how)
     initial_state = initial_state_for(begin.model, options["initial_state"])
@@ -175,14 +168,11 @@ def fitted_together(
             remedy = "Leave out `shared`, or take another `initial_state`."
             _checks.refuse("initial_state", "be the same for dampers that share parameters", "'estimated'", remedy)
         return many(**_one_by_one(records, begin.law, free, how))
-    sigma = [weights(options["weighting"], runs) for runs in records]
-    groups = grouped_records(begin.model, records, sigma, options["samples_per_cycle"], initial_state)
-    lanes = Lanes(Coordinates(free, smooth="ordered"), groups, np.arange(len(dampers)))
-    if priors:
-        noise = FIRST_NOISE * lanes.levels() / np.sqrt(lanes.samples())
-        lanes = lanes._replace(priors=LanePriors(_once(priors_on(free, priors, 1.0)[0], free, depends), noise))
+    start = begin._replace(initial_state=initial_state, priors=_once(begin.priors, free, depends))
+    sigma, by_runs = [weights(options["weighting"], runs) for runs in records], options["weighting"] == "runs"
+    problems = start.problems(records, sigma, options["samples_per_cycle"], each=by_runs)
     how_far = options["loss"], options["starts"], options["max_steps"]
-    return many(dependence=depends, **_side_by_side(lanes, records, depends, *how_far))
+    return many(dependence=depends, **_side_by_side(Lanes.of(problems), records, depends, *how_far))
 
 
 def _side_by_side(
@@ -200,16 +190,20 @@ def _side_by_side(
         alone, best, _ = _solved(lanes, begin, None, max_steps)
         lanes, begin = lanes._replace(damper=everyone), alone.y[best]
     end, best, vector = _solved(lanes, begin, depends, max_steps)
-    lanes = lanes._replace(damper=everyone)
-    fitted = by_rounds(lanes, end.of(best), loss, lambda some, y: _solved(some, y, depends, max_steps)[0], depends)
-    if depends is not None and (loss != "squares" or lanes.priors is not None):
-        vector = depends.start(fitted.end.y)
-    return _judged(fitted, depends, [len(runs) for runs in records]) | {
-        "values": np.asarray(_physical(lanes.coordinates, jnp.asarray(fitted.end.y))[0], np.float64),
-        "status": tuple(fitted.end.status),
-        "steps": fitted.end.steps,
+    lanes, end = by_rounds(
+        lanes._replace(damper=everyone),
+        end.of(best),
+        loss,
+        lambda some, y: _solved(some, y, depends, max_steps)[0],
+        depends,
+    )
+    if depends is not None:
+        vector = depends.start(end.y)
+    return judged(lanes, end, depends) | {
+        "status": tuple(end.status),
+        "steps": end.steps,
         "vector": vector,
-        "share_left_out": fitted.share_left_out,
+        "share_left_out": np.array([problem.share_left_out for problem in lanes.problems]),
     }
 
 
@@ -237,39 +231,40 @@ def _one_by_one(
     }
 
 
-def _once(priors: Priors, free: FreeParameters, depends: Dependence | None) -> Priors:
+def _once(priors: Sequence[Priors], free: FreeParameters, depends: Dependence | None) -> tuple[Priors, ...]:
     """Priors that count once for all dampers together where a parameter is shared."""
     if depends is None:
-        return priors
+        return tuple(priors)
     shared = {p.path for p, degree in zip(free.owners, depends.degree, strict=True) if degree != OWN}
-    count = np.array([len(depends.column) if path in shared else 1 for path in priors.paths])
-    return dataclasses.replace(priors, deviation=priors.deviation * jnp.asarray(np.sqrt(count)))
+    counts = [np.array([len(depends.column) if path in shared else 1 for path in one.paths]) for one in priors]
+    return tuple(
+        dataclasses.replace(one, deviation=one.deviation * jnp.asarray(np.sqrt(count)))
+        for one, count in zip(priors, counts, strict=True)
+    )
 
 
 def _with_other_starts(
     lanes: Lanes, records: Sequence[Sequence[BenchRun]], starts: int
 ) -> tuple[Lanes, Float[np.ndarray, "lanes free"]]:
     """A lane for every start of every damper, and the coordinates to start from."""
-    free, together = lanes.coordinates.free, [run for runs in records for run in runs]
+    free, together = lanes.searches[0].coordinates.free, [run for runs in records for run in runs]
     begin = [np.asarray(free.values)]
     if starts > 1:
         reach = Reach(0.5 * max(float(np.ptp(r.stroke)) for r in together), max(r.peak_velocity for r in together))
         begin += other_starts(free, reach)[: starts - 1]
-    coordinates = np.asarray(_from_physical(lanes.coordinates, jnp.asarray(np.array(begin))), np.float64)
+    coordinates = np.array([lanes.searches[0].coordinates.from_physical(values) for values in begin], np.float64)
     dampers = np.arange(len(records))
     return lanes._replace(damper=dampers.repeat(len(begin))), np.tile(coordinates, (len(records), 1))
-
-
-@eqx.filter_jit
-def _from_physical(coordinates: Coordinates, values: Float[Array, "lanes free"]) -> Float[Array, "lanes free"]:
-    return jax.vmap(coordinates.from_physical)(values)
 
 
 def _solved(
     lanes: Lanes, begin: Float[np.ndarray, "lanes free"], depends: Dependence | None, max_steps: int
 ) -> tuple[SearchLanes, np.ndarray, np.ndarray | None]:
     """The ends of all lanes, the best lane of each damper, and the vector of shared parameters."""
-    bounds, precision = lanes.coordinates.bounds(), float(jnp.finfo(lanes.coordinates.free.values.dtype).eps)
+    bounds, precision = (
+        lanes.searches[0].coordinates.bounds(),
+        float(jnp.finfo(lanes.searches[0].coordinates.free.values.dtype).eps),
+    )
     if depends is None:
         dampers = np.unique(lanes.damper)
         solver = BoundedLevenbergMarquardt(lower=bounds.lower, upper=bounds.upper, precision=precision)
@@ -291,59 +286,3 @@ def _solved(
     products = np.broadcast_to(end.aux, (count, *end.aux.shape[1:]))
     together = SearchLanes(y, products, end.status * count, end.steps.repeat(count))
     return together, everyone, end.y[0]
-
-
-@eqx.filter_jit
-def _physical(coordinates: Coordinates, y: Float[Array, "lanes free"]) -> tuple[Array, Array]:
-    """Physical values and their derivatives by the coordinates."""
-    return jax.vmap(coordinates.to_physical)(y), jax.vmap(jax.jacfwd(coordinates.to_physical))(y)
-
-
-def _judged(fitted: Fitted, depends: Dependence | None, counts: Sequence[int]) -> dict[str, Any]:
-    """Errors of each damper and of each of its records, drift, and standard errors of its numbers."""
-    lanes, (count, free) = fitted.lanes, fitted.end.y.shape
-    percent, rmse, drift, noise = (np.zeros(count) for _ in range(4))
-    first, by_record = np.cumsum([0, *counts]), tuple(np.zeros(n) for n in counts)
-    free_numbers, levels = free if depends is None else depends.size / count, lanes.levels()
-    for i, records in enumerate(lanes.missed(fitted.end.y)):
-        errors = [record.residual / record.weight for record in records]
-        drift[i] = max(record.drift for record in records)
-        together, measured = np.concatenate(errors), np.concatenate([record.force for record in records])
-        rmse[i] = np.sqrt(np.mean(together**2))
-        spread = np.linalg.norm(measured - measured.mean())
-        percent[i] = 100.0 * (1.0 - np.linalg.norm(together) / spread) if spread > 0 else -np.inf
-        for record, error in zip(records, errors, strict=True):
-            by_record[i][record.number - first[i]] = np.sqrt(np.mean(error**2))
-        noise[i] = (fitted.factor[i] * noise_level([r.residual for r in records], free_numbers) / levels[i]) ** 2
-    errors_of_numbers = _standard_errors(fitted, depends, noise)
-    named = {"standard_errors": errors_of_numbers, "fit_percent": percent, "rmse": rmse, "record_rmse": by_record}
-    return named | {"drift": drift}
-
-
-def _standard_errors(
-    fitted: Fitted, depends: Dependence | None, noise: Float[np.ndarray, " dampers"]
-) -> Float[np.ndarray, "dampers free"]:
-    """Standard errors of the numbers of each damper, from the variance of the noise relative to its level."""
-    y, products = fitted.end.y, fitted.end.aux
-    slopes = np.asarray(_physical(fitted.lanes.coordinates, jnp.asarray(y))[1], np.float64)
-    inverse = [_inverse(of_damper[:-1, :-1]) for of_damper in (products if depends is None else products[:1])]
-    errors, free = np.zeros(y.shape), y.shape[1]
-    for i in range(len(y)):
-        columns, rows = (np.arange(free), np.eye(free)) if depends is None else depends.rows(i)
-        variances, lost = inverse[i if depends is None else 0]
-        variance = noise[i] if depends is None else float(np.mean(noise))
-        to_values = slopes[i] @ rows
-        covariance = variance * to_values @ variances[np.ix_(columns, columns)] @ to_values.T
-        undetermined = np.any(lost[columns] & (to_values != 0), axis=1)
-        errors[i] = np.where(undetermined, np.inf, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
-    return errors
-
-
-def _inverse(products: Float[np.ndarray, "free free"]) -> tuple[np.ndarray, np.ndarray]:
-    """(JᵀJ)⁻¹ without the directions that change no force, and the numbers that take part in those."""
-    norms = np.sqrt(np.diag(products))
-    scale = np.where(norms > 0, norms, 1.0)
-    squares, directions = np.linalg.eigh(products / np.outer(scale, scale))
-    seen = squares > BLIND * squares[-1]
-    inverse = (directions[:, seen] / squares[seen]) @ directions[:, seen].T
-    return inverse / np.outer(scale, scale), np.sum(directions[:, seen] ** 2, axis=1) < 1.0 - 1e-3

@@ -17,13 +17,13 @@ from jaxdamp import _checks
 from jaxdamp._status import Status
 from jaxdamp.bench import BenchRun, DamperRecords
 from jaxdamp.blocks import AbstractWork, Blocks, BlockStore, Cluster, Variable, fill, stored_blocks
-from jaxdamp.identify.many_records import AllRecords, Beginning, Options, begun_on, fitted_records, refuse_several_laws
+from jaxdamp.identify.many_records import AllRecords, Options, begun_on, fitted_records, refuse_several_laws
 from jaxdamp.identify.many_result import ManyFits
+from jaxdamp.identify.preparing import Beginning
 from jaxdamp.identify.starting import Start
 
 
 BLOCK = 64  # dampers: some seconds of work, and few enough records for any memory
-SETTLED = 8  # dampers from which numbers of them are rounded up to powers of two, each of which is compiled once
 ABSENT = "Its records were not among those of the call that came to its block."
 FLOAT = np.dtype(np.float64)
 NUMBERS = ("fit_percent", "rmse", "drift", "share_left_out")  # of each damper, beside values and standard errors
@@ -93,10 +93,8 @@ class DamperFits(AbstractWork):
         if not records:
             return {}
         names = list(records)
-        size = len(names) if len(names) < SETTLED else 2 ** (len(names) - 1).bit_length()
-        further = {f"{names[-1]} ({i})": records[names[-1]] for i in range(size - len(names))}  # compiles nothing new
         try:
-            many = fitted_together(self._beginning, {**records, **further}, self._options)
+            many = fitted_together(self._beginning, records, self._options)
         except MemoryError:
             raise
         except Exception as error:

@@ -1,19 +1,17 @@
 """The records of many dampers: what a call gives as such, what a fit takes of them, and where all fits start."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun, DamperRecords, as_runs, usable
-from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.contradicting import contradicting, refuse_contradicting
-from jaxdamp.identify.machine import absent_paths, started_on
-from jaxdamp.identify.model import Model, on_rig, own_names
+from jaxdamp.identify.model import Model
+from jaxdamp.identify.preparing import Beginning, begun
 from jaxdamp.identify.starting import Start
-from jaxdamp.identify.stated import start_paths, stated_parameters, stated_values
-from jaxdamp.parameters import FreeParameters, free_parameters
+from jaxdamp.identify.stated import stated_parameters
 
 
 CALL = 'fit_many(law, {"A": runs_of_a, "B": runs_of_b})'
@@ -66,14 +64,6 @@ def refuse_several_laws(name: str, runs: tuple[BenchRun, ...], model: Model, opt
         refuse_contradicting(contradicting(model, runs), f"dampers[{name!r}]")
 
 
-class Beginning(NamedTuple):
-    """Where the fits of all dampers start."""
-
-    law: AbstractDamper
-    model: Model  # with the machine
-    free: FreeParameters
-
-
 def begun_on(law: Start, runs: Sequence[BenchRun], options: Options, shared: Iterable[str] = ()) -> Beginning:
     """The start that some records give.
 
@@ -83,15 +73,5 @@ def begun_on(law: Start, runs: Sequence[BenchRun], options: Options, shared: Ite
         options: of `fit_many`.
         shared: names of parameters that are shared.
     """
-    bounds, priors, tie = (options[name] for name in ("bounds", "priors", "tie"))
-    named = [*(bounds or ()), *(priors or ()), *(tie or ()), *shared]
-    begun, machine, held = started_on(law, runs, options["rig"], named)
-    model = on_rig(begun, machine)
-    stated = stated_values(model, runs)  # temperatures that the records begin with
-    held = (*held, *(path for path in start_paths(model) if path in stated))
-    names = own_names(model)
-    freeze = (*names.find("freeze", options["freeze"]), *absent_paths(machine), *held)
-    limits, tied = names.find_keys("bounds", bounds), names.find_keys("tie", tie)
-    free = free_parameters(model, freeze=freeze, bounds=limits, tie=tied)
-    _checks.finite("law", free.values)
-    return Beginning(begun, model, free)
+    how = {name: options[name] for name in ("rig", "freeze", "bounds", "tie", "priors")}
+    return begun(law, runs, [1.0] * len(runs), **how, initial_state="warm_up", mentioned=shared)

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
-from jaxdamp.dampers import Reach
+from jaxdamp.dampers import AbstractDamper, Reach
 from jaxdamp.identify.criteria import FIRST_NOISE, Priors, priors_on
 from jaxdamp.identify.estimated_states import first_states
 from jaxdamp.identify.initial_states import INITIAL_STATES, moving_samples, starts_in_words
@@ -32,8 +33,8 @@ from jaxdamp.identify.model import (
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.identify.stated import stated_parameters, stated_values, with_stated
-from jaxdamp.identify.traces import batches, owners, places
-from jaxdamp.parameters import free_parameters, match_paths, name_patterns, parameters, with_values
+from jaxdamp.identify.traces import batches_of_each, owners, places
+from jaxdamp.parameters import FreeParameters, free_parameters, match_paths, name_patterns, parameters, with_values
 
 
 FIT_OUTSIDE = "Call it outside `jax.jit`, `jax.grad` and `jax.vmap`; the residuals of a `Problem` can be traced."
@@ -88,43 +89,95 @@ def prepare(
     _checks.untraced("law", law, FIT_OUTSIDE)
     runs = _records(runs)
     sigma = weights(weighting, runs)
+    begin = begun(
+        law,
+        runs,
+        sigma,
+        rig=rig,
+        over=over,
+        freeze=freeze,
+        bounds=bounds,
+        tie=tie,
+        per_record=per_record,
+        priors=priors,
+        initial_state=initial_state,
+    )
+    return begin.problems([runs], [sigma], samples_per_cycle, each=weighting == "runs")[0]
+
+
+class Beginning(NamedTuple):
+    """Where fits start."""
+
+    law: AbstractDamper
+    model: Model  # with the machine
+    free: FreeParameters
+    per_record: tuple[str, ...]  # paths of the parameters with a value for each record
+    initial_state: str  # of the records
+    priors: tuple[Priors, ...]  # what is known beforehand, in units of a noise that the records give
+
+    def problems(
+        self,
+        dampers: Sequence[tuple[BenchRun, ...]],
+        sigma: Sequence[Sequence[float]],
+        samples_per_cycle: int | None,
+        *,
+        each: bool,
+    ) -> tuple[Problem, ...]:
+        """The problem of the records of each damper with these `weights`, each with a noise level if so stated."""
+        how, problems = (samples_per_cycle, self.per_record, self.initial_state), []
+        made = batches_of_each(self.model, dampers, sigma, *how)
+        for runs, deviations, (residuals, ranges) in zip(dampers, sigma, made, strict=True):
+            weighted = (np.asarray(part.force) * np.asarray(part.weight) for part in residuals)
+            level = float(np.sqrt(sum(np.sum(np.square(force)) for force in weighted)))
+            fitted = [run for run, s in zip(runs, deviations, strict=True) if np.isfinite(s)]
+            reach = Reach(0.5 * max(float(np.ptp(r.stroke)) for r in fitted), max(r.peak_velocity for r in fitted))
+            count = sum(np.count_nonzero(part.used()) for part in residuals) if self.priors else 1
+            noise = FIRST_NOISE * level / np.sqrt(max(count, 1))
+            priors = tuple(replace(prior, noise=jnp.asarray(noise)) for prior in self.priors)
+            owner, where = owners(residuals, ranges), places(residuals, ranges)
+            owner = np.concatenate([owner, *(np.zeros(part.size, owner.dtype) for part in priors)])
+            steps = tuple(at.block / run.sampling_rate for at, run in zip(ranges, runs, strict=True))
+            of_records = (level, runs, tuple(deviations), owner, reach, self.law, self.per_record, each, steps, where)
+            problems.append(Problem(self.free, (*residuals, *priors), *of_records, self.initial_state))
+        return tuple(problems)
+
+
+def begun(
+    law: Start,
+    runs: Sequence[BenchRun],
+    sigma: Sequence[float],
+    *,
+    rig: Machine,
+    over: Sequence[str] | None = None,
+    freeze: Sequence[str],
+    bounds: Mapping[str, tuple[float, float]] | None,
+    tie: Mapping[str, str] | None,
+    per_record: Sequence[str] = (),
+    priors: Mapping[str, tuple[float, float]] | None,
+    initial_state: str,
+    mentioned: Iterable[str] = (),
+) -> Beginning:
+    """The start that records with these `weights` give, as in `fit`, and what the call mentions besides."""
     fitted_to = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
-    mentioned = [*name_patterns("per_record", per_record), *(bounds or ()), *(priors or ()), *(tie or {})]
-    begin, machine, held = started_on(law, fitted_to, rig, mentioned)
+    named = [*mentioned, *name_patterns("per_record", per_record), *(bounds or ()), *(priors or ()), *(tie or {})]
+    begin, machine, held = started_on(law, fitted_to, rig, named)
     model, absent = on_rig(begin, machine), [*absent_paths(machine), *held]
     initial_state = initial_state_for(model, initial_state)
     expected: tuple[Priors, ...] = ()
     if initial_state == "estimated":
         model, expected, unfitted = _with_estimated_states(model, runs, sigma)
         absent = [*absent, *unfitted]
-    named = own_names(model)
+    names = own_names(model)
     stated = stated_values(model, runs)
     model = with_stated(model, stated_parameters(model, fitted_to))
-    own = _per_record(model, named.find("per_record", per_record), sigma, absent, stated)
-    left = not_chosen(model, over, "rig.", STARTS)
-    frozen = [*named.find("freeze", freeze), *named.find("freeze", frozen_by(law)), *absent, *left]
-    frozen += [p.path for p in parameters(model) if p.path in stated]
-    bounds, priors, tie = (
-        named.find_keys("bounds", bounds),
-        named.find_keys("priors", priors),
-        named.find_keys("tie", tie),
-    )
-    free = free_parameters(_spread(model, own, len(runs)), freeze=frozen, bounds=bounds, tie=tie)
+    own = _per_record(model, names.find("per_record", per_record), sigma, absent, stated)
+    frozen = [*names.find("freeze", freeze), *names.find("freeze", frozen_by(law)), *absent]
+    frozen += [*not_chosen(model, over, "rig.", STARTS), *(p.path for p in parameters(model) if p.path in stated)]
+    limits, tied = names.find_keys("bounds", bounds), names.find_keys("tie", tie)
+    free = free_parameters(_spread(model, own, len(runs)), freeze=frozen, bounds=limits, tie=tied)
     _checks.finite("law", free.values)
-    residuals, ranges = batches(model, runs, sigma, samples_per_cycle, own, initial_state)
-    owner = owners(residuals, ranges)
-    weighted = (np.asarray(part.force) * np.asarray(part.weight) for part in residuals)
-    level = float(np.sqrt(sum(np.sum(np.square(force)) for force in weighted)))
-    reach = Reach(0.5 * max(float(np.ptp(r.stroke)) for r in fitted_to), max(r.peak_velocity for r in fitted_to))
-    noise = FIRST_NOISE * level / np.sqrt(max(np.count_nonzero(owner >= 0), 1))
-    known = (*priors_on(free, priors or {}, noise), *(replace(prior, noise=jnp.asarray(noise)) for prior in expected))
-    owner = np.concatenate([owner, *(np.zeros(part.size, owner.dtype) for part in known)])
-    steps = tuple(at.block / run.sampling_rate for at, run in zip(ranges, runs, strict=True))
-    each, sigma = weighting == "runs", tuple(sigma)
-    where = places(residuals, ranges)
-    return Problem(
-        free, (*residuals, *known), level, runs, sigma, owner, reach, begin, own, each, steps, where, initial_state
-    )
+    known = priors_on(free, names.find_keys("priors", priors) or {}, 1.0)
+    return Beginning(begin, model, free, own, initial_state, (*known, *expected))
 
 
 def _records(runs: BenchRun | Iterable[BenchRun]) -> tuple[BenchRun, ...]:

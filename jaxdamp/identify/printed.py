@@ -7,8 +7,7 @@ for each reason.
 """
 
 import dataclasses
-import functools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import jax
 import numpy as np
@@ -31,11 +30,9 @@ def _blank(tree: PyTree) -> PyTree:
     return jax.tree.map(lambda leaf: np.full(leaf.shape, -1.0) if is_number(leaf) else leaf, tree)
 
 
-def _refusal(parts: Sequence[object], model: PyTree) -> str:
+def _refusal(parts: Sequence[Batch], model: PyTree) -> str:
     """Why these records with this model are left to XLA; empty if they are not."""
     for part in parts:
-        if not isinstance(part, Batch):
-            return f"{type(part).__name__} beside the records"
         if others := [effect for effect in part.effects if effect not in PRINTED]:
             return f"a machine with {', '.join(others)}"
         if part.temperature is not None:
@@ -89,18 +86,24 @@ class Evaluator:
         law: the printed functions.
         rows: of each record its place among the residuals, its motion, the numbers of its law, and which of them take
             which free number (−1: none).
-        size: number of the residuals.
+        size: number of the residuals of records.
         free: number of the free numbers.
+        derivatives: the numbers of the law by which its functions are differentiated.
+        beside: further rows, after those of the records, that are linear in the free numbers (`linear_rows`).
     """
 
     law: PrintedLaw
     rows: list[tuple[int, Row, np.ndarray, np.ndarray]]
     size: int
     free: int
+    derivatives: Int[np.ndarray, " slopes"]
+    beside: Float[np.ndarray, "rows columns"]
 
     def __call__(self, values: Float[np.ndarray, " free"]) -> Float[np.ndarray, "samples columns"]:
         """The Jacobian of the weighted residual, which is the last column."""
-        out = np.zeros((self.size, self.free + 1))
+        out = np.zeros((self.size + len(self.beside), self.free + 1))
+        out[self.size :] = self.beside
+        out[self.size :, -1] += self.beside[:, :-1] @ values
         for place, row, p, taken in self.rows:
             at, columns = self._at(p, taken, values), self._columns(taken)
             if not row.effects:
@@ -115,9 +118,13 @@ class Evaluator:
             out[place : place + len(shown)] = row.missed(shown)
         return out
 
+    def counted(self, out: Float[np.ndarray, "samples columns"]) -> list[Float[np.ndarray, "rows columns"]]:
+        """The rows of each record without samples after the last used, and those beside the records."""
+        return [*(out[place : place + row.used] for place, row, _, _ in self.rows), out[self.size :]]
+
     def triangle(self, out: Float[np.ndarray, "samples columns"]) -> Float[np.ndarray, "rows columns"]:
-        """Rows with the same products of columns: the triangles of the records, without samples after the last used."""
-        return np.concatenate([triangle(out[place : place + row.used]) for place, row, _, _ in self.rows])
+        """Rows with the same products of columns: the triangles of the records."""
+        return np.concatenate([triangle(rows) for rows in self.counted(out)])
 
     def margins(
         self, values: Float[np.ndarray, " free"]
@@ -137,49 +144,77 @@ class Evaluator:
         """Of each derivative the free number; of those by a number that is not free the column of the residual."""
         return np.where(taken >= 0, taken, self.free)[self.derivatives]
 
-    @functools.cached_property
-    def derivatives(self) -> Int[np.ndarray, " slopes"]:
-        """The numbers of the law by which its functions are differentiated."""
-        numbers = np.arange(self.rows[0][2].size)
-        return np.concatenate([numbers[:0], *(numbers[part] for part in self.parts)])
-
-    parts: tuple[slice, ...] = ()
-
 
 def evaluator(free: FreeParameters, residuals: Sequence[AbstractResiduals]) -> Evaluator | None:
     """The residuals of records as printed C; None where XLA computes them."""
-    batches = [part for part in residuals if isinstance(part, Batch)]
-    reason = _refusal(residuals, free.tree)
+    return next(iter(evaluators(free, [residuals])), None)
+
+
+def evaluators(free: FreeParameters, problems: Sequence[Sequence[AbstractResiduals]]) -> list[Evaluator]:
+    """`evaluator` of the residuals of many problems with the same free numbers; none where XLA computes them."""
+    parts = [part for residuals in problems for part in residuals]
+    batches = [part for part in parts if isinstance(part, Batch)]
+    others = [type(part).__name__ for part in parts if not isinstance(part, Batch) and part.linear_rows(free) is None]
+    reason = _refusal(batches, free.tree) or "".join(f"{name} beside the records" for name in others[:1])
     conditions = any(law.has_conditions() for _, law in laws_inside(free.tree))
     if not reason and conditions and any(batch.per_record for batch in batches):
         reason = "a value for each record beside conditions"
     if reason:
         say(f"Computed by XLA: {reason}.")
-        return None
-    model, taken_tree = free.build(free.values), _taken(free)  # with the values that are tied to others
-    each = [record for batch in batches for record in _with_numbers(batch, model, taken_tree)]
-    if not each:
-        return None
-    first = each[0][1]
-    law = printed_law(first, {i for *_, taken in each for i, array in enumerate(taken.arrays) if np.any(array >= 0)})
+        return []
+    model, taken = free.build(free.values), _taken(free)  # with the values that are tied to others
+    common = numbers_on_rig(model), numbers_on_rig(taken, _blank(plain_rig()))
+    each = [_with_numbers(residuals, model, taken, common) for residuals in problems]
+    unique = {id(numbers): numbers for records in each for _, *both in records for numbers in both}
+    marked = [unique[key] for key in {id(taken) for records in each for *_, taken in records}]
+    first = next((numbers for records in each for _, numbers, _ in records), None)
+    if first is None:
+        return []
+    law = printed_law(first, {i for numbers in marked for i, array in enumerate(numbers.arrays) if np.any(array >= 0)})
     if law is None:
-        return None
-    ends = np.cumsum([array.size for array in first.arrays])
-    parts = tuple(slice(int(ends[i]) - first.arrays[i].size, int(ends[i])) for i in law.free)
-    places = np.cumsum([0, *(row.weight.size for row, *_ in each)]).tolist()
-    rows = [
-        (place, row, numbers.flat, taken.flat.astype(np.int64))
-        for place, (row, numbers, taken) in zip(places[:-1], each, strict=True)
-    ]
-    return Evaluator(law, rows, places[-1], free.values.size, parts)
+        return []
+    ends, numbers = np.cumsum([array.size for array in first.arrays]), np.arange(first.flat.size)
+    derivatives = np.concatenate([numbers[:0], *(numbers[ends[i] - first.arrays[i].size : ends[i]] for i in law.free)])
+    flat = {key: one.flat for key, one in unique.items()}
+    made = []
+    for residuals, records in zip(problems, each, strict=True):
+        rows, place = [], 0
+        for row, numbers, taken in records:
+            rows.append((place, row, flat[id(numbers)], flat[id(taken)].astype(np.int64)))
+            place += row.weight.size
+        made.append(Evaluator(law, rows, place, free.values.size, derivatives, rows_beside(free, residuals)))
+    return made
 
 
-def _with_numbers(batch: Batch, model: Model, taken: PyTree) -> Iterator[tuple[Row, LawNumbers, LawNumbers]]:
-    """The records of a batch with the numbers of their laws, and with the number of the free value that each takes."""
-    # values that the records state take no free number
-    mine = with_values(taken, {path: np.asarray(-1.0) for path in batch.fixed})
-    marked = _numbers_of(dataclasses.replace(batch, fixed={}), mine, _blank(plain_rig()))
-    return zip(rows_of(batch), _numbers_of(batch, model), marked, strict=True)
+def rows_beside(free: FreeParameters, residuals: Sequence[AbstractResiduals]) -> Float[np.ndarray, "rows columns"]:
+    """The `linear_rows` of all residuals that have some."""
+    rows = (part.linear_rows(free) for part in residuals if not isinstance(part, Batch))
+    return np.concatenate([np.zeros((0, free.values.size + 1)), *(own for own in rows if own is not None)])
+
+
+def _with_numbers(
+    residuals: Sequence[AbstractResiduals], model: Model, taken: PyTree, common: tuple[LawNumbers, LawNumbers]
+) -> list[tuple[Row, LawNumbers, LawNumbers]]:
+    """The records with the numbers of their laws, and with the number of the free value that each takes.
+
+    Arguments:
+        residuals: the records.
+        model: the law.
+        taken: of the law.
+        common: both, of records without values of their own.
+    """
+    records = []
+    for batch in residuals:
+        if not isinstance(batch, Batch):
+            continue
+        rows, each = rows_of(batch), ([common[0]] * len(batch.dt), [common[1]] * len(batch.dt))
+        if batch.fixed or batch.per_record:
+            # values that the records state take no free number
+            mine = with_values(taken, {path: np.asarray(-1.0) for path in batch.fixed})
+            marked = _numbers_of(dataclasses.replace(batch, fixed={}), mine, _blank(plain_rig()))
+            each = _numbers_of(batch, model), marked
+        records += zip(rows, *each, strict=True)
+    return records
 
 
 def _taken(free: FreeParameters) -> PyTree:

@@ -52,6 +52,10 @@ class AbstractResiduals(eqx.Module):
         """The same with other measured numbers."""
         return self
 
+    def linear_rows(self, free: FreeParameters) -> Float[np.ndarray, "rows columns"] | None:
+        """Derivatives by the free numbers and, last, the residual where these are zero; None where not linear."""
+        del free
+
     @abstractmethod
     def total_weight(self) -> Float[Array, ""]:
         """Sum of the squared weights, the number of samples as measured where all weigh the same."""

@@ -11,7 +11,7 @@ from jaxtyping import Array, Bool
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun
 from jaxdamp.identify.initial_states import Cycle, moving_samples, repeated_motion, start_of
-from jaxdamp.identify.model import Model, blind_end, effects_of, law_of
+from jaxdamp.identify.model import Model, blind_end
 
 
 COARSEST = 0.48  # rad between samples, beyond which straight lines between them are the larger error
@@ -103,17 +103,17 @@ def row_of(
     sigma: float,
     samples_per_cycle: int | None,
     model: Model,
+    angle: float,
     can_rest: bool,
     channels: Sequence[str],
     initial_state: str,
     number: int,
 ) -> Row:
-    """A record as `traces.batches` says; `can_rest` is asked of the model once for all records, which is slow."""
+    """A record as `traces.batches` says; the largest step `angle` [rad] and `can_rest` are asked once for all."""
     omega = dominant_rate(run)
     block = samples_in_block(run, samples_per_cycle)
     dt = block / run.sampling_rate
-    angles = [law_of(model).traits().step_angle, *[LAG_ANGLE] * ("lag" in effects_of(model))]
-    substeps = max(int(np.ceil(min(omega * dt, COARSEST) / min(angles))), 1)
+    substeps = max(int(np.ceil(min(omega * dt, COARSEST) / angle)), 1)
     start = start_of(run, initial_state)
     warm_up = 0 if start in ("rest", "estimated") else int(min(2 * np.pi / omega, run.duration) / dt)
     signals = [averaged(values, block) for values in _with_warm_up(run, warm_up * block, channels)]

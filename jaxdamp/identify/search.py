@@ -3,6 +3,7 @@
 Only the forces of the law and their derivatives are compiled, in one program for all points, starts and profiles.
 """
 
+import copy
 import dataclasses
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -17,7 +18,7 @@ from jaxtyping import Array, Float
 from jaxdamp._status import Status
 from jaxdamp._triangles import triangle
 from jaxdamp.dampers import laws_inside, margins
-from jaxdamp.identify.printed import evaluator
+from jaxdamp.identify.printed import Evaluator, evaluator, evaluators
 from jaxdamp.identify.problem import AbstractResiduals, Problem, linearised
 from jaxdamp.parameters import Coordinates
 from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, least_squares_on_host
@@ -52,6 +53,16 @@ class SearchEnd(NamedTuple):
         return bool(np.isfinite(self.squares) and np.all(np.isfinite(self.jacobian)))
 
 
+class Here(NamedTuple):
+    """A problem at a point."""
+
+    values: Float[np.ndarray, " free"]
+    whole: Float[np.ndarray, "samples columns"]  # the Jacobian by them of the weighted residual, which is the last
+    units: Float[np.ndarray, "free free"]  # derivatives of the values by the coordinates
+    margins: Float[np.ndarray, " conditions"]
+    slopes: Float[np.ndarray, "conditions free"]  # by the coordinates
+
+
 class _Point(NamedTuple):
     """The problem at a point, with an axis of length one."""
 
@@ -68,6 +79,17 @@ class Searches:
         self._kind = problem.free.values.dtype
         self._printed = evaluator(problem.free, problem.residuals) if self._kind == np.float64 else None
         self._to_values = self.coordinates.on_host() if self._printed else None
+
+    @property
+    def is_printed(self) -> bool:
+        """Whether C computes the residuals."""
+        return self._printed is not None
+
+    def of(self, problem: Problem, printed: Evaluator | None) -> "Searches":
+        """Those of another problem with the same free numbers."""
+        other = copy.copy(self)
+        other.problem, other._printed = problem, printed
+        return other
 
     def end(
         self,
@@ -97,12 +119,36 @@ class Searches:
 
     def _at(self, y: Float[np.ndarray, "1 free"], lanes: object) -> tuple[Linearisation, _Point]:
         del lanes  # there is one
+        here = self.here(y[0])
+        reduced = self._printed.triangle(here.whole) if self._printed else here.whole
+        return _linearised(self.problem, here, reduced)
+
+    def here(self, y: Float[np.ndarray, " free"]) -> Here:
+        """The problem at coordinates."""
         if self._printed is None or self._to_values is None:
-            return _by_xla(self.problem, self.coordinates, jnp.asarray(y[0], self._kind))
-        values, units = self._to_values(y[0])
+            return _by_xla(self.problem, self.coordinates, jnp.asarray(y, self._kind))
+        values, units = self._to_values(y)
         of_law, slopes = self._printed.margins(values)
-        whole = self._printed(values)
-        return _linearised(self.problem, values, whole, self._printed.triangle(whole), units, of_law, slopes @ units)
+        return Here(values, self._printed(values), units, of_law, slopes @ units)
+
+    def products(self, here: Here) -> Float[np.ndarray, "columns columns"]:
+        """The products of the columns of the Jacobian and the residual, relative to the squares of the forces.
+
+        A triangle is a hundred times more work, and rounding errors of the products matter only for what the records
+        do not determine.
+        """
+        counted = self._printed.counted(here.whole) if self._printed else [here.whole]
+        products = sum((rows.T @ rows for rows in counted), np.zeros((here.whole.shape[1],) * 2))
+        products[:-1] = here.units.T @ products[:-1]
+        products[:, :-1] = products[:, :-1] @ here.units
+        return products / self.problem.level**2
+
+
+def searches_of(problems: Sequence[Problem]) -> list[Searches]:
+    """Searches of problems with the same free numbers."""
+    first = Searches(problems[0])
+    printed = evaluators(first.problem.free, [p.residuals for p in problems]) if first.is_printed else []
+    return [first.of(problem, one) for problem, one in zip(problems, printed or [None] * len(problems), strict=True)]
 
 
 def search(problem: Problem, max_steps: int, solver: Solver | None = None) -> SearchEnd:
@@ -119,30 +165,20 @@ def search(problem: Problem, max_steps: int, solver: Solver | None = None) -> Se
     return Searches(problem).end(np.asarray(problem.free.values), max_steps, solver=solver)
 
 
-def _by_xla(problem: Problem, coordinates: Coordinates, y: Array) -> tuple[Linearisation, _Point]:
+def _by_xla(problem: Problem, coordinates: Coordinates, y: Array) -> Here:
     """The problem at a point, by the one compiled program."""
-    evaluated = _evaluated(coordinates, y, problem.residuals)
-    values, whole, *of_coordinates = (np.asarray(a, np.float64) for a in evaluated)
-    return _linearised(problem, values, whole, whole, *of_coordinates)
+    return Here(*(np.asarray(a, np.float64) for a in _evaluated(coordinates, y, problem.residuals)))
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def _linearised(
-    problem: Problem,
-    values: np.ndarray,
-    whole: np.ndarray,
-    reduced: np.ndarray,
-    units: np.ndarray,
-    of_law: np.ndarray,
-    slopes: np.ndarray,
-) -> tuple[Linearisation, _Point]:
+def _linearised(problem: Problem, here: Here, reduced: np.ndarray) -> tuple[Linearisation, _Point]:
     """The problem at a point, from what `_evaluated` gives and rows with the same products of columns."""
-    anchor = problem.anchor_rows(values)
+    anchor, whole = problem.anchor_rows(here.values), here.whole
     whole = np.concatenate([whole, anchor]) if anchor.size else whole
     rows = triangle(np.concatenate([reduced, anchor]) if anchor.size else reduced)
-    rows = np.concatenate([rows[:, :-1] @ units, rows[:, -1:]], axis=1) / problem.level
-    here = _Point(values[None], whole[None, :, -1], whole[None, :, :-1])
-    return Linearisation(rows[None], of_law[None], slopes[None], np.array([float(len(whole))])), here
+    rows = np.concatenate([rows[:, :-1] @ here.units, rows[:, -1:]], axis=1) / problem.level
+    point = _Point(here.values[None], whole[None, :, -1], whole[None, :, :-1])
+    return Linearisation(rows[None], here.margins[None], here.slopes[None], np.array([float(len(whole))])), point
 
 
 @eqx.filter_jit
@@ -179,7 +215,7 @@ def _search_unbounded(problem: Problem, max_steps: int, solver: Solver) -> Searc
     solution = optx.least_squares(residual, solver, start, max_steps=max_steps, throw=False)
     bounded = problem.coordinates
     y = bounded.from_physical(coordinates.to_physical(solution.value))
-    _, point = _by_xla(problem, bounded, y)
+    end = _by_xla(problem, bounded, y)
     if solution.result == optx.RESULTS.successful:
         status = Status.CONVERGED
     elif solution.result == optx.RESULTS.nonlinear_max_steps_reached:
@@ -187,7 +223,8 @@ def _search_unbounded(problem: Problem, max_steps: int, solver: Solver) -> Searc
     else:
         status = Status.NO_STEP
     steps = int(solution.stats["num_steps"])
-    return SearchEnd(point.values[0], point.residual[0], point.jacobian[0], status, steps)
+    whole = np.concatenate([end.whole, problem.anchor_rows(end.values)])
+    return SearchEnd(end.values, whole[:, -1], whole[:, :-1], status, steps)
 
 
 class _Residual(eqx.Module):

@@ -17,13 +17,13 @@ from jaxdamp.identify.model import (
     can_rest,
     effects_of,
     initial_state,
-    initial_state_for,
-    is_memoryless,
+    law_of,
     marched,
     starts_in,
 )
 from jaxdamp.identify.problem import AbstractResiduals
 from jaxdamp.identify.rows import (
+    LAG_ANGLE,
     Row,
     averaged,
     channel,
@@ -39,7 +39,6 @@ from jaxdamp.rig import Followed
 
 
 MOST_GROUPS = 2  # batches of a law with states: each is compiled on its own
-RECORDS_IN_GROUP = 200  # of many dampers, for which a further batch saves a quarter of the work
 
 
 @final
@@ -151,7 +150,6 @@ def _grouped(rows: Sequence[Row]) -> list[list[int]]:
 
     All records of a group take the steps of the longest. A step costs about as much as 16 records in parallel.
     """
-    most = max(MOST_GROUPS, len(rows) // RECORDS_IN_GROUP)
 
     def cost(group: list[int]) -> int:
         steps = max(len(rows[i].weight) for i in group) * max(rows[i].substeps for i in group)
@@ -162,7 +160,7 @@ def _grouped(rows: Sequence[Row]) -> list[list[int]]:
         alike.setdefault((_round_up(len(row.weight)), row.substeps), []).append(i)
     groups = list(alike.values())
 
-    while len(groups) > most:
+    while len(groups) > MOST_GROUPS:
         pairs = [(a, b) for a in range(len(groups)) for b in range(a)]
         a, b = min(pairs, key=lambda p: cost(groups[p[0]] + groups[p[1]]) - cost(groups[p[0]]) - cost(groups[p[1]]))
         groups[b] = groups[b] + groups.pop(a)
@@ -191,7 +189,6 @@ def _batch(
 
 
 def _memoryless_batch(
-    model: Model,
     runs: Sequence[BenchRun],
     sigma: Sequence[float],
     samples_per_cycle: int | None,
@@ -206,8 +203,7 @@ def _memoryless_batch(
         for name in channels
     ]
     weight = np.repeat(np.sqrt(blocks) / np.asarray(sigma), counts)
-    if not can_rest(model):
-        weight[np.concatenate([resting_blocks(r, b) for r, b in zip(runs, blocks, strict=True)])] = 0.0
+    weight[np.concatenate([resting_blocks(r, b) for r, b in zip(runs, blocks, strict=True)])] = 0.0
     arrays = (np.ones(1), *columns[:3], _pad(weight, length, "constant")[None], np.zeros(1, int))
     followed = dict(zip(channels[3:], map(on_device, columns[3:]), strict=True))
     ranges = [SampleRange(0, 0, int(end) - n, int(end), b) for end, n, b in zip(ends, counts, blocks, strict=True)]
@@ -242,44 +238,40 @@ def batches(
     Returns:
         The batches, and for each record where it is.
     """
-    fixed, channels = stated_values(model, runs), followed_channels(model, runs)
-    if is_memoryless(model) and not (fixed or per_record):
-        return _memoryless_batch(model, runs, sigma, samples_per_cycle, channels)
-    rows, groups, made = _row_batches(model, runs, sigma, samples_per_cycle, per_record, initial_state)
-    ranges: dict[int, SampleRange] = {}
-    for number, group in enumerate(groups):
-        for k, i in enumerate(group):
-            ranges[i] = SampleRange(number, k, rows[i].warm_up, len(rows[i].weight), rows[i].block)
-    return made, [ranges[i] for i in range(len(runs))]
+    (answer,) = batches_of_each(model, [runs], [sigma], samples_per_cycle, per_record, initial_state)
+    return answer
 
 
-def record_batches(
+def batches_of_each(
     model: Model,
-    runs: Sequence[BenchRun],
-    sigma: Sequence[float],
-    samples_per_cycle: int | None,
-    initial_state: str,
-) -> tuple[Batch, ...]:
-    """Records prepared as in `batches`, but always with a row for each record, also for a model without memory."""
-    return _row_batches(model, runs, sigma, samples_per_cycle, (), initial_state)[2]
-
-
-def _row_batches(
-    model: Model,
-    runs: Sequence[BenchRun],
-    sigma: Sequence[float],
+    dampers: Sequence[Sequence[BenchRun]],
+    sigma: Sequence[Sequence[float]],
     samples_per_cycle: int | None,
     per_record: tuple[str, ...],
     initial_state: str,
-) -> tuple[list[Row], list[list[int]], tuple[Batch, ...]]:
-    """A row for each record, the groups of rows, and the batch of each group."""
-    start = "rest" if is_memoryless(model) else initial_state_for(model, initial_state)
-    channels = followed_channels(model, runs)
-    how = (samples_per_cycle, model, can_rest(model), channels, start)
-    rows = [row_of(run, s, *how, number) for number, (run, s) in enumerate(zip(runs, sigma, strict=True))]
-    groups, fixed, effects = _grouped(rows), stated_values(model, runs), effects_of(model)
-    members = [([rows[i] for i in group], [runs[i] for i in group]) for group in groups]
-    return rows, groups, tuple(_batch(*of, fixed, per_record, effects, channels) for of in members)
+) -> list[tuple[tuple[Batch, ...], list[SampleRange]]]:
+    """`batches` of the records of each damper, of which the model takes the same."""
+    together = [run for runs in dampers for run in runs]
+    fixed, channels = stated_values(model, together), followed_channels(model, together)
+    rests, effects = can_rest(model), effects_of(model)
+    if not (rests or effects or fixed or per_record):
+        return [_memoryless_batch(*of, samples_per_cycle, channels) for of in zip(dampers, sigma, strict=True)]
+    if not rests:
+        initial_state = ("warm_up" if initial_state == "estimated" else initial_state) if effects else "rest"
+    angle = min([law_of(model).traits().step_angle, *[LAG_ANGLE] * ("lag" in effects)])
+    how, each, first = (samples_per_cycle, model, angle, rests, channels, initial_state), [], 0
+    for runs, deviations in zip(dampers, sigma, strict=True):
+        rows = [row_of(run, s, *how, number) for number, (run, s) in enumerate(zip(runs, deviations, strict=True))]
+        groups, ranges = _grouped(rows), dict[int, SampleRange]()
+        for number, group in enumerate(groups):
+            for k, i in enumerate(group):
+                ranges[i] = SampleRange(number, k, rows[i].warm_up, len(rows[i].weight), rows[i].block)
+        own = {path: values[first : first + len(runs)] for path, values in fixed.items()}
+        members = [([rows[i] for i in group], [runs[i] for i in group]) for group in groups]
+        made = tuple(_batch(*of, own, per_record, effects, channels) for of in members)
+        each.append((made, [ranges[i] for i in range(len(runs))]))
+        first += len(runs)
+    return each
 
 
 def places(made: Sequence[Batch], ranges: Sequence[SampleRange]) -> tuple[slice, ...]:

@@ -71,10 +71,40 @@ def test_records_cut_out_of_a_long_motion_start_in_the_periodic_solution():
     assert drifting.remarks[1] == "its states are not periodic: over a cycle they still change by 0.01"
 
 
-@pytest.mark.parametrize(("each", "groups"), [(10, 2), (200, 3)])
-def test_further_batches_are_compiled_for_many_records_only(each, groups):
-    rows = [Row(1e-3, [], np.ones(size), 0, 0, 1, 1) for size in (2000, 700, 200) for _ in range(each)]
-    assert sorted(len(group) for group in _grouped(rows))[-1] == each * (4 - groups) and len(_grouped(rows)) == groups
+def test_records_of_three_lengths_are_computed_in_two_loops():
+    rows = [Row(1e-3, [], np.ones(size), 0, 0, 1, 1) for size in (2000, 700, 200) for _ in range(10)]
+    assert sorted(len(group) for group in _grouped(rows)) == [10, 20]
+
+
+LAGGING = Lag(Bilinear(1500.0, 1500.0), 2e-3)
+PRINTED = [
+    {"rig": ["gas", "delay"]},
+    {"loss": "huber", "priors": {"lag_time": (5e-3, 1e-4)}},
+    {"shared": ["rebound_rate"], "priors": {"rebound_rate": (2400.0, 20.0)}},
+    {"weighting": "runs", "freeze": ["compression_rate"], "starts": 2},
+    {"initial_state": "rest", "samples_per_cycle": 60, "tie": {"compression_rate": "rebound_rate"}},
+]
+
+
+@pytest.mark.parametrize("options", PRINTED, ids=["machine", "loss and priors", "shared", "starts", "tie"])
+@pytest.mark.exhaustive_cases("machine", "shared", "starts", "tie")
+def test_dampers_with_different_records_are_fitted_alike_by_c_and_by_xla(options, monkeypatch):
+    tests = [SineTest(0.02, 1.0, cycles=2), SineTest(0.01, 4.0), SineTest(0.015, 2.0, cycles=2)]
+    dampers = {}
+    for i in range(3):
+        law = Lag(Bilinear(2000.0 + 100.0 * i, 1200.0), 5e-3)
+        dyno = VirtualDyno(law, force_noise=4.0, sampling_rate=200.0, seed=i)
+        dampers[str(i)] = list(dyno.run(tests[: i + 1]))
+    by_c = fit_many(LAGGING, dampers, **options)
+    if "shared" not in options:  # what a damper gets does not depend on the others
+        alone = fit_many(LAGGING, {"1": dampers["1"]}, **options)
+        np.testing.assert_allclose(by_c.values[1], alone.values[0], rtol=1e-9)
+    monkeypatch.setattr("jaxdamp.identify.search.evaluator", lambda *_: None)
+    by_xla = fit_many(LAGGING, dampers, **options)
+    assert by_xla.status == by_c.status and by_xla.remarks == by_c.remarks
+    assert np.all(np.abs(by_xla.values - by_c.values) <= 1e-6 * by_c.standard_errors)
+    for name in ("standard_errors", "fit_percent", "rmse"):
+        np.testing.assert_allclose(getattr(by_xla, name), getattr(by_c, name), rtol=1e-6)
 
 
 def test_shared_parameters_follow_the_setting(clicks):
