@@ -15,6 +15,7 @@ import signal
 import socket
 import sys
 import threading
+import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -25,6 +26,7 @@ from jaxdamp._forked import started
 
 T = TypeVar("T")
 MOST = 4  # processes, this one too
+PATIENCE = 1.0  # s to put things in order at the end
 _Call: TypeAlias = tuple[Callable[..., object], tuple[object, ...]]
 UNPICKLED = (pickle.PicklingError, AttributeError, TypeError)
 DIE_WITH_PARENT = 1  # of Linux: `PR_SET_PDEATHSIG`
@@ -90,7 +92,13 @@ class Process:
         except OSError:
             pass  # it has ended
         os.kill(self.pid, signal.SIGTERM)  # until it is waited for, the number is its own
-        os.waitpid(self.pid, 0)
+        patience = time.monotonic() + PATIENCE
+        while not os.waitpid(self.pid, os.WNOHANG)[0]:
+            if time.monotonic() > patience:  # such as in a compiler, which hears nothing
+                os.kill(self.pid, signal.SIGKILL)
+                os.waitpid(self.pid, 0)
+                break
+            time.sleep(0.002)
         self._stream.close()
         self._ends.close()
 

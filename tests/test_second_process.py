@@ -50,6 +50,11 @@ with second.opened(lambda: None):
     thread.join()
 with second.opened(lambda: None):
     second.elsewhere(time.sleep, 60.0)  # nobody waits for it
+def deaf():
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
+    time.sleep(60.0)
+with second.opened(lambda: None):
+    second.elsewhere(deaf)
 import jax
 jax.devices()
 with second.opened(lambda: None):
