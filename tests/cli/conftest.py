@@ -1,3 +1,4 @@
+import io
 from pathlib import Path
 
 import matplotlib.figure
@@ -16,7 +17,13 @@ def pictures_where_looked_at(request: pytest.FixtureRequest, monkeypatch: pytest
         return
     blank = page._png(matplotlib.figure.Figure(figsize=(0.1, 0.1)))
     monkeypatch.setattr(page, "_png", lambda figure: blank)
-    monkeypatch.setattr(matplotlib.figure.Figure, "savefig", lambda figure, path, **_: Path(path).write_bytes(b""))
+    monkeypatch.setattr(matplotlib.figure.Figure, "savefig", not_drawn)
+
+
+def not_drawn(figure: matplotlib.figure.Figure, target: str | Path | io.BytesIO, **_: object) -> None:
+    """A file without a picture."""
+    if not isinstance(target, io.BytesIO):
+        Path(target).write_bytes(b"")
 
 
 @pytest.fixture(scope="session")
