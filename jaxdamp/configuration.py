@@ -84,7 +84,7 @@ def configure(
         jax.config.update("jax_num_cpu_devices", devices)
         os.environ["XLA_FLAGS"] = _with_option(os.environ.get("XLA_FLAGS", ""), fused_loops)
     jax.config.update("jax_enable_x64", x64)
-    if jax.config.jax_default_matmul_precision is None:  # pyright: ignore[reportAttributeAccessIssue]
+    if not x64 and jax.config.jax_default_matmul_precision is None:  # pyright: ignore[reportAttributeAccessIssue]
         jax.config.update("jax_default_matmul_precision", "highest")
     folder = _folder(cache)
     jax.config.update("jax_compilation_cache_dir", str(folder) if folder else None)

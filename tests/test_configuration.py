@@ -20,9 +20,11 @@ before = dict(jax.config.values), dict(os.environ), sys.getrecursionlimit()
 import jaxdamp
 assert (dict(jax.config.values), dict(os.environ), sys.getrecursionlimit()) == before
 jaxdamp.configure(cache=False)
-assert jax.config.jax_default_matmul_precision == "highest"  # of a GPU in single precision
+assert jax.config.jax_default_matmul_precision is None  # which a sweep would take for another function
+jaxdamp.configure(x64=False, cache=False)
+assert jax.config.jax_default_matmul_precision == "highest"  # of a GPU
 jax.config.update("jax_default_matmul_precision", "tensorfloat32")
-jaxdamp.configure(cache=False)
+jaxdamp.configure(x64=False, cache=False)
 assert jax.config.jax_default_matmul_precision == "tensorfloat32"
 """
 

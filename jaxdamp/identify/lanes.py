@@ -53,7 +53,7 @@ class Lanes(NamedTuple):
         used = self.used[damper]
         return [signal[place][used[place]] for place in self.problems[damper].places]
 
-    def noise(self, damper: int, residual: Float[np.ndarray, " samples"], free: float) -> float:
+    def noise(self, damper: int, residual: Float[np.ndarray, " samples"], free: float | int) -> float:
         """Standard deviation of the weighted residual of a damper, larger where it is correlated.
 
         Arguments:

@@ -171,8 +171,8 @@ def own_names(model: Model | VehicleTest) -> OwnNames:
     return OwnNames(alone, beside, "vehicle." if isinstance(model, VehicleTest) else "law.")
 
 
-def starts_in(model: Model) -> tuple[RecordStart | None, ...]:
-    """How each record begins, if this is estimated."""
+def starts_in(model: object) -> tuple[RecordStart | None, ...]:
+    """How each record begins, if this is estimated; of a vehicle none."""
     return model.records if isinstance(model, OnRig) else ()
 
 
