@@ -3,8 +3,6 @@
 import numpy as np
 from jaxtyping import Float
 
-from jaxdamp._filters import smoothed
-
 
 Samples = Float[np.ndarray, " time"]
 
@@ -90,7 +88,9 @@ def motion_amplitude(time: Samples, stroke: Samples, frequency: float) -> float:
     window = round((len(time) - 1) / (time[-1] - time[0]) / frequency / 20)
     window = min(window, len(stroke) - 1) // 2 * 2 + 1
     if window > 5:
-        stroke = smoothed(stroke, window, 4)
+        from scipy.signal import savgol_filter  # takes a second to import, and not every record needs it
+
+        stroke = np.asarray(savgol_filter(stroke, window, 4))
     return float(np.max(stroke) - np.min(stroke)) / 2
 
 

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from jaxdamp._filters import decaying
 from jaxdamp.identify.traces import Batch
 
 
@@ -173,14 +172,16 @@ def lagged(
     values: Float[np.ndarray, "time columns"], samples: float
 ) -> tuple[Float[np.ndarray, "time columns"], Samples]:
     """`rig.sensor.lagged` of each column, and the derivative of the last one by the number of samples."""
+    from scipy.signal import lfilter
+
     there = samples > 1e-3
     decay = np.exp(-1.0 / samples) if there else 0.0
     by_decay = decay / samples**2 if there else 0.0
     mean, by_mean = samples * (1.0 - decay), 1.0 - decay - samples * by_decay
-    later = decaying(np.concatenate([values[:1], (1.0 - mean) * values[1:] + (mean - decay) * values[:-1]]), decay)
+    later, _ = lfilter([1.0 - mean, mean - decay], [1.0, -decay], values, axis=0, zi=mean * values[:1])
     last, shown = values[:, -1], later[:, -1]
     change = np.append(0.0, by_decay * shown[:-1] + (by_mean - by_decay) * last[:-1] - by_mean * last[1:])
-    return later, decaying(change, decay)
+    return later, np.asarray(lfilter([1.0], [1.0, -decay], change))
 
 
 def slopes(values: Samples) -> Samples:

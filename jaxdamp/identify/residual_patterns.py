@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
+from scipy.interpolate import CubicSpline
+from scipy.signal import lfilter
 
-from jaxdamp._filters import decaying, spline
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.traces import Batch
@@ -230,9 +231,8 @@ def hysteresis(records: Sequence[Record], late: dict[str, float]) -> Pattern:
 
 def delayed(motion: Motion, delay: float) -> Values:
     """The force a time later [s], less the force."""
-    samples, force = np.arange(motion.force.size), motion.force
-    step = motion.time[1] - motion.time[0]
-    return spline(force, np.clip(samples - delay / step, 0.0, samples[-1])) - force
+    time, force = motion.time, motion.force
+    return CubicSpline(time, force)(np.clip(time - delay, time[0], time[-1])) - force
 
 
 def filtered(motion: Motion, lag: float) -> Values:
@@ -242,7 +242,8 @@ def filtered(motion: Motion, lag: float) -> Values:
         return -lag * np.gradient(force, motion.time)
     decay, part = np.exp(-ratio), -np.expm1(-ratio) / ratio
     feed, first = np.array([1.0 - part, part - decay]), force[0] - (force[1] - force[0]) / ratio
-    return decaying(np.concatenate([[first], feed[0] * force[1:] + feed[1] * force[:-1]]), decay) - force
+    following, _ = lfilter(feed, [1.0, -decay], force[1:], zi=[feed[1] * force[0] + decay * first])
+    return np.concatenate([[first], following]) - force
 
 
 LATE = {"delay": delayed, "lag": filtered}

@@ -3,7 +3,6 @@
 import base64
 import datetime
 import html
-import io
 import os
 import platform
 import warnings
@@ -12,13 +11,12 @@ from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from jaxdamp._display import display
 from jaxdamp._second_process import elsewhere
 from jaxdamp._tables import Table
 from jaxdamp._types import Figure
 from jaxdamp._words import first_upper, said
+from jaxdamp.report.drawing import Drawn, drawn
 
 
 class Attempts:
@@ -50,8 +48,6 @@ class Attempts:
 
 
 PIXELS = 86  # of a page for an inch of a picture: the widest ones fill the page
-COLOURS = 40  # of a picture: nobody sees the difference, and the file has a quarter of the size
-DOTS = 130  # of a picture in an inch
 _PAGE = """<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -230,21 +226,21 @@ class Report:
         for axes in figure.axes:
             _ = axes.get_xlim(), axes.get_ylim()  # what they call when they change does not go with them
         width = round(PIXELS * figure.get_figwidth())
-        drawing = elsewhere(_drawn, figure, bool(pdf))
+        drawing = elsewhere(drawn, figure, bool(pdf))
 
-        def image(drawn: _Drawn) -> str:
-            for text in drawn.warnings:
+        def image(picture: Drawn) -> str:
+            for text in picture.warnings:
                 warnings.warn(text, UserWarning, stacklevel=2)
             if self._folder is not None:
-                (self._folder / name).write_bytes(drawn.png)
+                (self._folder / name).write_bytes(picture.png)
                 if pdf:
-                    (self._folder / pdf).write_bytes(drawn.pdf)
-            source = f"data:image/png;base64,{base64.b64encode(drawn.png).decode('ascii')}"
-            return f'<img alt="{html.escape(drawn.finding or words)}" width="{width}" src="{source}">'
+                    (self._folder / pdf).write_bytes(picture.pdf)
+            source = f"data:image/png;base64,{base64.b64encode(picture.png).decode('ascii')}"
+            return f'<img alt="{html.escape(picture.finding or words)}" width="{width}" src="{source}">'
 
         if drawing is not None:
             return lambda: image(drawing())
-        text = image(_drawn(figure, bool(pdf)))
+        text = image(drawn(figure, bool(pdf)))
         return lambda: text
 
     def to_html(self, command: str = "") -> str:
@@ -289,55 +285,6 @@ class Report:
         path = Path(path)
         path.write_text(self.to_html(command), encoding="utf-8")
         return path
-
-
-class _Drawn(NamedTuple):
-    """A picture as files, what its titles say, and what matplotlib warned of."""
-
-    png: bytes
-    pdf: bytes
-    finding: str
-    warnings: list[str]
-
-
-def _drawn(figure: Figure, as_pdf: bool) -> _Drawn:
-    """A figure drawn, as PDF too if it is asked for."""
-    pdf = io.BytesIO()
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", UserWarning)
-        png = _png(figure)
-        if as_pdf:
-            figure.savefig(pdf, format="pdf")
-    texts = [str(warning.message) for warning in caught if warning.category is UserWarning]
-    return _Drawn(png, pdf.getvalue(), _finding(figure), texts)
-
-
-def _png(figure: Figure) -> bytes:
-    """A figure as a small PNG file."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from PIL import Image
-
-    small, canvas, dots = io.BytesIO(), figure.canvas, figure.dpi
-    try:  # `savefig` draws twice, once for the layout, and packs what is unpacked here
-        figure.dpi = DOTS
-        agg = FigureCanvasAgg(figure)
-        agg.draw()
-        drawn = Image.fromarray(np.asarray(agg.buffer_rgba()))
-    finally:
-        figure.set_canvas(canvas)
-        figure.dpi = dots
-    # Colours chosen from a ninth of the dots, as good, in a seventh of the time.
-    drawn, plain = drawn.convert("RGB"), Image.Dither.NONE
-    colours = drawn.resize([size // 3 for size in drawn.size], Image.Resampling.NEAREST)
-    few = drawn.quantize(palette=colours.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, 1, dither=plain), dither=plain)
-    few.save(small, format="png", optimize=True)
-    return small.getvalue()
-
-
-def _finding(figure: Figure) -> str:
-    """What the title of a figure says, or the titles of its panels."""
-    titles = [figure.get_suptitle(), *(axes.get_title(loc="left") for axes in figure.axes)]
-    return ". ".join(" ".join(title.split()) for title in titles if title)
 
 
 def _points(items: Sequence[str]) -> str:

@@ -7,7 +7,7 @@ import pytest
 from jaxdamp import bench
 from jaxdamp.bench import BenchSet, SineTest
 from jaxdamp.dampers import Bilinear
-from jaxdamp.report import page
+from jaxdamp.report import drawing
 
 
 @pytest.fixture(autouse=True)
@@ -15,8 +15,8 @@ def pictures_where_looked_at(request: pytest.FixtureRequest, monkeypatch: pytest
     """Drawing takes half the time of a command: figures are made in all tests, drawn in `pictures` and long ones."""
     if any(request.node.get_closest_marker(kind) for kind in ("pictures", "slow", "exhaustive")):
         return
-    blank = page._png(matplotlib.figure.Figure(figsize=(0.1, 0.1)))
-    monkeypatch.setattr(page, "_png", lambda figure: blank)
+    blank = drawing.png(matplotlib.figure.Figure(figsize=(0.1, 0.1)))
+    monkeypatch.setattr(drawing, "png", lambda figure: blank)
     monkeypatch.setattr(matplotlib.figure.Figure, "savefig", not_drawn)
 
 
