@@ -261,10 +261,8 @@ def _solved(
     lanes: Lanes, begin: Float[np.ndarray, "lanes free"], depends: Dependence | None, max_steps: int
 ) -> tuple[SearchLanes, np.ndarray, np.ndarray | None]:
     """The ends of all lanes, the best lane of each damper, and the vector of shared parameters."""
-    bounds, precision = (
-        lanes.searches[0].coordinates.bounds(),
-        float(jnp.finfo(lanes.searches[0].coordinates.free.values.dtype).eps),
-    )
+    coordinates = lanes.searches[0].coordinates
+    bounds, precision = coordinates.bounds(), float(jnp.finfo(coordinates.free.values.dtype).eps)
     if depends is None:
         dampers = np.unique(lanes.damper)
         solver = BoundedLevenbergMarquardt(lower=bounds.lower, upper=bounds.upper, precision=precision)
