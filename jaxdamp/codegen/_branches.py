@@ -14,8 +14,8 @@ from jaxdamp.codegen._program import (
     Define,
     Loop,
     Statement,
-    Table,
     Variable,
+    changed,
     constant,
     names,
     names_in,
@@ -64,11 +64,11 @@ def in_branches(
     return [*(Declare(v, constant(0, v.dtype)) for v in sorted(shared, key=lambda v: v.name)), *written]
 
 
-def without_need(statements: Sequence[Define | Table], results: set[str], costly: set[str]) -> dict[str, bool] | None:
+def without_need(statements: Sequence[Statement], results: set[str], costly: set[str]) -> dict[str, bool] | None:
     """What conditions of selections have to be, by name, so that nothing costly is used; None if something always is.
 
     Arguments:
-        statements: of a block without loops.
+        statements: of a block, those inside loops in their place.
         results: names that are used after it.
         costly: names of what is costly.
     """
@@ -88,7 +88,7 @@ def where(statements: Sequence[Statement], conditions: Mapping[str, bool], resul
         known = conditions.get(condition.name) if isinstance(condition, Variable) else None
         return s if known is None else Define(s.target, "copy", (yes if known else no,))
 
-    return pruned([chosen(s) for s in statements], results)
+    return pruned(changed(statements, chosen), results)
 
 
 def _runs(

@@ -1,21 +1,21 @@
 """The body of a loop over steps as C for many points side by side."""
 
-import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
-from typing import NamedTuple, TypeGuard, final
+from typing import NamedTuple, final
 
 import numpy as np
 
-from jaxdamp.codegen import _arrays
+from jaxdamp.codegen import _arrays, _program
 from jaxdamp.codegen._branches import where, without_need
 from jaxdamp.codegen._jaxprs import Inner, printing
-from jaxdamp.codegen._languages import FUNCTIONS, C
+from jaxdamp.codegen._languages import FUNCTIONS
 from jaxdamp.codegen._loop_passes import Kept, kept_values, sums_of_products
 from jaxdamp.codegen._lowering import evaluated
 from jaxdamp.codegen._program import (
     Atom,
     Atoms,
+    Branch,
     Declare,
     Define,
     Statement,
@@ -23,23 +23,23 @@ from jaxdamp.codegen._program import (
     Variable,
     Writer,
     array_of,
+    changed,
     constant,
+    each,
     names,
     names_in,
     operands_of,
     pruned,
+    with_operands,
 )
+from jaxdamp.codegen._runs import LIMITS, OfPoint, Step, assigned, in_vectors
 
 
 OF_POINT, OF_STEP = 1, 2  # what a number depends on: bits, both of them where it differs from point to point and step
 OF_BOTH = OF_POINT | OF_STEP
-# {1} is not NaN; a NaN of {0} is the result, as that of the second operand of a vector minimum is
-_LIMITS = {"min": "{1} < {0} ? {1} : {0}", "max": "{1} > {0} ? {1} : {0}"}
 _NAN = constant(np.nan, "float64")
 _SPOILT = ("for (int i = 0; i < STATE; i++)", "    state[i][lane] += missing;")
 WIDTH = 16  # of the printed block in the template
-_VECTORS = "abcd"  # of a block that a step takes in turn, operation by operation: each waits for its own last result
-_LONG = 700  # lines of a step that keep a processor busy with one vector, and a compiler with four for minutes
 
 
 @final
@@ -56,22 +56,17 @@ class Loop(NamedTuple):
 
     parts: dict[str, str | list[str]]  # lines of C by what they depend on, and counts
     laned: tuple[bool, ...]  # which of the carried values differ from point to point
-    straight: bool  # whether a step is without loops and branches
+    steps: dict[str, Step]  # what depends on point and step
 
     @property
     def text(self) -> str:
-        """C for points side by side in vectors, which cannot follow loops and branches inside a step."""
-        if not self.straight:
-            message = "A loop or a branch inside a step cannot be printed for many points side by side."
-            raise NotImplementedError(message)
-        vectors = _VECTORS[: 4 if len(self.parts["of_both"]) <= _LONG else 1]
-        in_turn = {name: list(_in_turn(self.parts[name], vectors)) for name in ("of_both", "of_simple")}
-        return _filled("lanes.c", self.parts | in_turn | {"vectors": str(len(vectors))})
+        """C for points side by side in vectors; in loops inside a step, points wait for each other."""
+        return _filled("lanes.c", self.parts | in_vectors(self.steps))
 
     @property
     def kernel(self) -> str:
         """CUDA for a point in each thread, which has its own loops and branches; compiled as C, threads are a loop."""
-        return _filled("kernel.cu", self.parts)
+        return _filled("kernel.cu", self.parts | {name: step.lines() for name, step in self.steps.items()})
 
 
 def lanes_in_c(body: Inner, constants: Sequence[Operand], carry: Sequence[Operand], row: Sequence[Operand]) -> Loop:
@@ -99,20 +94,9 @@ def lanes_in_c(body: Inner, constants: Sequence[Operand], carry: Sequence[Operan
             for operand, array in zip(carry, after, strict=True)
         ]
         if grown == carry:
-            parts = _parts(statements, levels, names_of, before, after)
-            return Loop(parts, tuple(c.level & OF_POINT > 0 for c in carry), _is_straight(statements))
+            parts, steps = _parts(statements, levels, names_of, before, after)
+            return Loop(parts, tuple(c.level & OF_POINT > 0 for c in carry), steps)
         carry = grown  # what seemed the same for all points is not
-
-
-class _InLanes(C):
-    """C with limits that are the same in all steps, and conditions as numbers by a choice: a cast is no vector."""
-
-    def own(self, operation: str, texts: list[str], dtypes: list[str], dtype: str) -> str | None:
-        """As in C."""
-        if operation == "convert" and dtypes == ["bool"] and dtype == "float64":
-            return f"{texts[0]} ? 1.0 : 0.0"
-        first, _, limit = operation.partition("limiting ")
-        return super().own(operation, texts, dtypes, dtype) if first else _LIMITS[limit].format(*texts)
 
 
 class _Names:
@@ -141,15 +125,10 @@ def _level(atom: Atom | None, levels: dict[str, int]) -> int:
     return levels[atom.name] if isinstance(atom, Variable) else 0
 
 
-def _is_straight(statements: list[Statement]) -> TypeGuard[list[Define | Table]]:
-    """Whether there are no loops and branches among statements."""
-    return all(isinstance(statement, Define | Table) for statement in statements)
-
-
 def _levels(statements: Iterable[Statement], known: dict[str, int]) -> dict[str, int]:
     """What each value depends on; what loops and branches assign is taken to depend on all."""
     levels = dict(known)
-    for statement in statements:
+    for statement in each(statements):
         if isinstance(statement, Declare):
             levels[statement.target.name] = OF_BOTH
         elif isinstance(statement, Define | Table):
@@ -162,29 +141,31 @@ def _levels(statements: Iterable[Statement], known: dict[str, int]) -> dict[str,
 
 def _parts(
     statements: list[Statement], levels: dict[str, int], inputs: _Names, before: list[Atoms], after: list[Atoms]
-) -> dict[str, str | list[str]]:
-    printer = _InLanes()
+) -> tuple[dict[str, str | list[str]], dict[str, Step]]:
+    printer = OfPoint()
     carried = _carried(before, after)
     repeated, limits, conditions = list[Kept](), dict[str, Variable](), dict[str, bool]()
-    if _is_straight(statements):
-        repeated, carried, straight = _with_kept(_loaded(statements, levels), levels, carried)
+    if not any(isinstance(s, Branch) for s in each(statements)):
+        repeated, carried, statements = _with_kept(_loaded(statements, levels), levels, carried)
         inside = {name for name, level in levels.items() if level == OF_BOTH}
-        straight = sums_of_products(straight, inside, carried)
-        straight, limits = _limited(straight, levels)
-        conditions = _without_functions(straight, levels, names(carried.values()))
-        statements = [*straight]
-    parts = _by_level(statements, levels)
+        statements = sums_of_products(statements, inside, carried)
+        statements, limits = _limited(statements, levels)
+        conditions = _without_functions(statements, levels, names(carried.values()))
+    parts: dict[int, list[Statement]] = {level: [] for level in range(4)}
+    parts[OF_BOTH] = _sorted(statements, levels, parts)
     hoisted = _read_later(parts[OF_POINT], parts[OF_BOTH], carried.values())
-    load = [f"const {printer.types[v.dtype]} {v.name} = hoisted[{i}][lane];" for i, v in enumerate(hoisted)]
-    store = [f"hoisted[{i}][lane] = {v.name};" for i, v in enumerate(hoisted)]
+    store = [f"{_hoisted_name(i)} = {v.name};" for i, v in enumerate(hoisted)]
     store += _missing(limits)
     store += printer.lines(dict.fromkeys(s for value in repeated for s in value.first), 0)
     store += [f"{_kept_name(i)} = {value.target.name};" for i, value in enumerate(repeated)]
-    ends = [(name, printer.atom(new)) for name, new in carried.items() if Variable(name, "float64") != new]
-    simpler = where(parts[OF_BOTH], conditions, names(carried.values()))
-    of_both, of_simple = (
-        [*load, *printer.lines(body, 0), *_assigned(ends, now=False)] for body in (parts[OF_BOTH], simpler)
-    )
+    ends = [(name, new) for name, new in carried.items() if Variable(name, "float64") != new]
+    simpler = where(parts[OF_BOTH], conditions, names(carried.values())) if conditions else []
+    of_points = [(target, value) for target, value in ends if not target.startswith("now")]
+    places = {v: _hoisted_name(i) for i, v in enumerate(hoisted)}
+    steps = {
+        "of_both": Step(places, parts[OF_BOTH], of_points),
+        "of_simple": Step(places, simpler, of_points if conditions else []),
+    }
     counts = inputs.counts
     return {
         **{name: str(counts[name]) for name in ("shared", "own", "now", "state")},
@@ -194,11 +175,9 @@ def _parts(
         "once": [*printer.lines(parts[0], 0)],
         "of_point": [*printer.lines(parts[OF_POINT], 0), *store],
         "of_step": [*printer.lines(parts[OF_STEP], 0)],
-        "of_both": of_both,
         "simple": _all(conditions),
-        "of_simple": of_simple if conditions else [],
-        "next": _assigned(ends, now=True),
-    }
+        "next": assigned((target, printer.atom(value)) for target, value in ends if target.startswith("now")),
+    }, steps
 
 
 def _all(conditions: dict[str, bool]) -> str:
@@ -206,12 +185,15 @@ def _all(conditions: dict[str, bool]) -> str:
     return " && ".join("!" * (not value) + name for name, value in conditions.items()) or "false"
 
 
-def _by_level(statements: list[Statement], levels: dict[str, int]) -> dict[int, list[Statement]]:
-    """Statements by what they depend on."""
-    parts: dict[int, list[Statement]] = {level: [] for level in range(4)}
+def _sorted(statements: list[Statement], levels: dict[str, int], parts: dict[int, list[Statement]]) -> list[Statement]:
+    """What depends on point and step; the others are added to the parts of what they depend on, out of loops too."""
+    left: list[Statement] = []
     for s in statements:
-        parts[levels.get(s.target.name, OF_BOTH) if isinstance(s, Define | Table) else OF_BOTH].append(s)
-    return parts
+        level = levels.get(s.target.name, OF_BOTH) if isinstance(s, Define | Table) else OF_BOTH
+        if isinstance(s, _program.Loop):
+            s = _program.Loop(_sorted(s.body, levels, parts))
+        (left if level == OF_BOTH else parts[level]).append(s)
+    return left
 
 
 def _read_later(statements: list[Statement], inside: list[Statement], results: Iterable[Atom]) -> list[Variable]:
@@ -230,37 +212,43 @@ def _kept_name(number: int) -> str:
     return f"kept[{number}][lane]"
 
 
-def _without_functions(statements: list[Define | Table], levels: dict[str, int], results: set[str]) -> dict[str, bool]:
+def _hoisted_name(number: int) -> str:
+    return f"hoisted[{number}][lane]"
+
+
+def _without_functions(statements: list[Statement], levels: dict[str, int], results: set[str]) -> dict[str, bool]:
     """What conditions that are the same for all points and steps have to be, so that no step takes a function.
 
     The knees of a curve, for instance, take exponentials only where they are rounded. None if functions are taken in
     any case, or in none.
     """
-    functions = {s.target.name for s in statements if isinstance(s, Define) and s.operation in FUNCTIONS - {"sqrt"}}
+    written = [*each(statements)]
+    functions = {s.target.name for s in written if isinstance(s, Define) and s.operation in FUNCTIONS - {"sqrt"}}
     functions = {name for name in functions if levels.get(name, OF_BOTH) == OF_BOTH}
-    conditions = without_need(statements, results, functions)
+    conditions = without_need(written, results, functions)
     return {} if conditions is None or any(map(levels.__getitem__, conditions)) else conditions
 
 
-def _loaded(statements: list[Define | Table], levels: dict[str, int]) -> list[Define | Table]:
+def _loaded(statements: list[Statement], levels: dict[str, int]) -> list[Statement]:
     """The same, with what selections choose from read before them: a choice of two places would be a gather."""
-    loaded: dict[Atom, Variable] = {}
-    written: list[Define | Table] = []
-    for s in statements:
-        if isinstance(s, Define) and s.operation == "select":
-            for atom in s.operands[1:]:
-                if isinstance(atom, Variable) and "[" in atom.name and atom not in loaded:
-                    loaded[atom] = Variable(f"loaded{len(loaded)}", atom.dtype)
-                    levels[loaded[atom].name] = levels[atom.name]
-                    written.append(Define(loaded[atom], "copy", (atom,)))
-            s = Define(s.target, s.operation, tuple(loaded.get(atom, atom) for atom in s.operands))
-        written.append(s)
-    return written
+    loaded: dict[Atom, Atom] = {}
+    loads: list[Statement] = []
+    for s in each(statements):
+        for atom in s.operands[1:] if isinstance(s, Define) and s.operation == "select" else ():
+            if isinstance(atom, Variable) and "[" in atom.name and atom not in loaded:
+                target = Variable(f"loaded{len(loaded)}", atom.dtype)
+                levels[target.name], loaded[atom] = levels[atom.name], target
+                loads.append(Define(target, "copy", (atom,)))
+
+    def reading(s: Statement) -> Statement:
+        return with_operands(s, loaded) if isinstance(s, Define) and s.operation == "select" else s
+
+    return loads + changed(statements, reading)
 
 
 def _with_kept(
-    statements: list[Define | Table], levels: dict[str, int], carried: dict[str, Atom]
-) -> tuple[list[Kept], dict[str, Atom], list[Define | Table]]:
+    statements: list[Statement], levels: dict[str, int], carried: dict[str, Atom]
+) -> tuple[list[Kept], dict[str, Atom], list[Statement]]:
     """The values that the step before has computed, what is then carried, and the statements that read them."""
     still = {name: Variable(name, "float64") for name, level in levels.items() if not level & OF_STEP}
     repeated = [
@@ -272,23 +260,16 @@ def _with_kept(
     levels |= {_kept_name(i): OF_BOTH for i in range(len(repeated))}
     carried = carried | {_kept_name(i): value.again for i, value in enumerate(repeated)}
     carried = {name: given.get(new, new) for name, new in carried.items()}
-
-    def reading(s: Define | Table) -> Define | Table:
-        atoms = tuple(given.get(a, a) for a in (s.operands if isinstance(s, Define) else s.entries))
-        return Define(s.target, s.operation, atoms) if isinstance(s, Define) else Table(s.target, atoms)
-
-    left = pruned([reading(s) for s in statements], names(carried.values()))
-    return repeated, carried, [s for s in left if isinstance(s, Define | Table)]
+    reading = changed(statements, lambda s: with_operands(s, given))
+    return repeated, carried, pruned(reading, names(carried.values()))
 
 
-def _limited(
-    statements: list[Define | Table], levels: dict[str, int]
-) -> tuple[list[Define | Table], dict[str, Variable]]:
+def _limited(statements: list[Statement], levels: dict[str, int]) -> tuple[list[Statement], dict[str, Variable]]:
     """Limits that are the same in all steps as one vector operation each, and those of them that may be NaN."""
     limits: dict[str, Variable] = {}
 
-    def limited(s: Define | Table) -> Define | Table:
-        if not isinstance(s, Define) or s.operation not in _LIMITS or s.target.dtype != "float64":
+    def limited(s: Statement) -> Statement:
+        if not isinstance(s, Define) or s.operation not in LIMITS or s.target.dtype != "float64":
             return s
         if levels.get(s.target.name) != OF_BOTH:
             return s
@@ -300,7 +281,7 @@ def _limited(
             limits[limit.name] = limit
         return Define(s.target, f"limiting {s.operation}", (value, limit))
 
-    return [limited(s) for s in statements], limits
+    return changed(statements, limited), limits
 
 
 def _missing(limits: Iterable[str]) -> list[str]:
@@ -309,23 +290,7 @@ def _missing(limits: Iterable[str]) -> list[str]:
     return [f"const double missing = {' + '.join(tests)};", *_SPOILT] if tests else []
 
 
-def _assigned(pairs: list[tuple[str, str]], *, now: bool) -> list[str]:
-    """What is the same for all points, or the rest, all at once: values are read before any of them changes."""
-    pairs = [pair for pair in pairs if pair[0].startswith("now") == now]
-    copies = [f"const double after{i} = {value};" for i, (_, value) in enumerate(pairs)]
-    return copies + [f"{target} = after{i};" for i, (target, _) in enumerate(pairs)]
-
-
-def _in_turn(lines: Iterable[str], vectors: str) -> Iterator[str]:
-    """Each line for one vector after the other, with names of its own for what it defines."""
-    lines = list(lines)
-    own = {"lane", *(name for line in lines for name in re.findall(r"^ *const \w+ (\w+)", line))}
-    for line in lines:
-        for vector in vectors:
-            yield re.sub(r"[A-Za-z]\w*", lambda word, v=vector: word[0] + v * (word[0] in own), line)
-
-
-def _filled(template: str, marks: dict[str, str | list[str]]) -> str:
+def _filled(template: str, marks: Mapping[str, str | list[str]]) -> str:
     text = resources.files("jaxdamp.codegen").joinpath(template).read_text(encoding="utf-8")
     for mark, lines in marks.items():
         block = lines if isinstance(lines, str) else "\n".join(" " * WIDTH + line for line in lines)

@@ -1,10 +1,24 @@
 """What makes the printed body of a loop cheaper: values kept from the step before, sums as fused multiply-adds."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import groupby
+from typing import NamedTuple, TypeGuard
 
-from jaxdamp.codegen._program import Atom, Constant, Define, Table, Variable, names, operands_of, pruned
+from jaxdamp.codegen._program import (
+    Atom,
+    Constant,
+    Define,
+    Loop,
+    Statement,
+    Table,
+    Variable,
+    each,
+    names,
+    names_in,
+    operands_of,
+    pruned,
+)
 
 
 CYCLES = {"add": 4.0, "sub": 4.0, "mul": 4.0, "div": 14.0, "sqrt": 20.0, "exp": 40.0, "pow": 80.0}  # about
@@ -19,7 +33,7 @@ class Kept(NamedTuple):
     first: list[Define]  # the statements that compute it before the first step
 
 
-def kept_values(statements: Sequence[Define | Table], after: Mapping[str, Atom], results: Iterable[Atom]) -> list[Kept]:
+def kept_values(statements: Sequence[Statement], after: Mapping[str, Atom], results: Iterable[Atom]) -> list[Kept]:
     """Values of the carried numbers that the body computes again from what they will be in the next step.
 
     What is evaluated at the beginning and at the end of each step, for instance: once is enough.
@@ -31,7 +45,7 @@ def kept_values(statements: Sequence[Define | Table], after: Mapping[str, Atom],
     """
     moved, defined = _computed_before(statements, after)
     outside = names(results)
-    outside |= names(a for s in statements if s.target.name not in defined for a in operands_of(s))
+    outside |= names_in(s for s in statements if not isinstance(s, Define) or s.target.name not in defined)
     values = []
     for name in filter(defined.__contains__, sorted(outside)):
         first = _tree(name, defined)
@@ -42,7 +56,7 @@ def kept_values(statements: Sequence[Define | Table], after: Mapping[str, Atom],
 
 
 def _computed_before(
-    statements: Sequence[Define | Table], after: Mapping[str, Atom]
+    statements: Sequence[Statement], after: Mapping[str, Atom]
 ) -> tuple[dict[str, Atom], dict[str, Define]]:
     """What numbers will be in the next step, and the statements whose value there is computed in this one."""
     targets = {(s.operation, s.operands, s.target.dtype): s.target for s in statements if isinstance(s, Define)}
@@ -76,35 +90,52 @@ def _tree(name: str, defined: Mapping[str, Define]) -> list[Define]:
     return [s for s in pruned(list(defined.values()), {name}) if isinstance(s, Define)]
 
 
-def sums_of_products(
-    statements: Sequence[Define | Table], inside: set[str], after: Mapping[str, Atom]
-) -> list[Define | Table]:
+def sums_of_products(statements: Sequence[Statement], inside: set[str], after: Mapping[str, Atom]) -> list[Statement]:
     """The same with products added last to each sum, one after the other, so that each is one multiply-add.
 
-    Among products, what is computed last is added last, so that as little as possible waits for it.
+    Among products, what is computed last is added last, so that as little as possible waits for it. A sum stays on its
+    side of a loop.
 
     Arguments:
         statements: of the body.
         inside: names of what is computed in every step.
         after: for each carried number, its value in the next step.
     """
-    sums = _Sums(statements, inside, after)
-    chains, replaced = sums.chains()
-    written: list[Define | Table] = []
-    for s in statements:
-        if s.target.name in chains:
-            written += _chain(s.target, chains[s.target.name])
-        elif s.target.name not in replaced:
-            written.append(s)
-    return written
+    uses = Counter(a.name for a in after.values() if isinstance(a, Variable))
+    for s in each(statements):
+        uses.update(a.name for a in operands_of(s) if isinstance(a, Variable))
+
+    def in_run(run: list[Define | Table]) -> Iterator[Statement]:
+        chains, replaced = _Sums(run, inside, after, uses).chains()
+        for s in run:
+            if s.target.name in chains:
+                yield from _chain(s.target, chains[s.target.name])
+            elif s.target.name not in replaced:
+                yield s
+
+    def in_block(block: Sequence[Statement]) -> Iterator[Statement]:
+        for _, run in groupby(block, lambda s: isinstance(s, Define | Table)):
+            run = list(run)
+            if is_straight(run):
+                yield from in_run(run)
+            else:
+                yield from (Loop([*in_block(s.body)]) if isinstance(s, Loop) else s for s in run)
+
+    return [*in_block(statements)]
+
+
+def is_straight(statements: list[Statement]) -> TypeGuard[list[Define | Table]]:
+    """Whether there are no loops, branches and assignments among statements."""
+    return all(isinstance(statement, Define | Table) for statement in statements)
 
 
 class _Sums:
-    """The sums among statements, with the sums inside them whose value is used nowhere else."""
+    """The sums among statements, with the sums inside them whose value is used nowhere else, by how often it is."""
 
-    def __init__(self, statements: Sequence[Define | Table], inside: set[str], after: Mapping[str, Atom]) -> None:
-        self._uses = Counter(a.name for s in statements for a in operands_of(s) if isinstance(a, Variable))
-        self._uses.update(a.name for a in after.values() if isinstance(a, Variable))
+    def __init__(
+        self, statements: Sequence[Define | Table], inside: set[str], after: Mapping[str, Atom], uses: Counter[str]
+    ) -> None:
+        self._uses = uses
         self._ready = _ready(statements, inside, after)
         self._parts = {s.target.name: s for s in statements if isinstance(s, Define) and s.target.name in inside}
 

@@ -31,7 +31,7 @@ FIT = Build((tuple(f"{_COMMON} -O2 -ftree-vectorize -ffp-contract=fast -lm".spli
 # Multiplications and additions are fused as XLA fuses them; sums stay in their order, what is not finite stays so.
 _LOOP = tuple(f"{_COMMON} -O3 -freciprocal-math -ffp-contract=fast -lm".split())
 _OF_GCC = (  # for x86; without the last one, loops that read a thousand places are not made vectors of
-    *("-mprefer-vector-width=512", "-mrecip", "-lmvec", "-ldl"),
+    *("-mprefer-vector-width=512", "-mrecip", "-fno-tree-pre", "-lmvec", "-ldl"),
     "--param=loop-max-datarefs-for-datadeps=1000000",
 )
 LOOP = Build(((*_LOOP, *_OF_GCC), _LOOP), with_xla=True)

@@ -1,6 +1,6 @@
 """Programs of scalar statements: what a JAX function is translated to, and what a language prints."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
@@ -300,8 +300,12 @@ def written(statements: Iterable[Statement]) -> set[str]:
     return targets
 
 
-def operands_of(statement: Define | Declare | Table | Assign | Leave) -> list[Atom | None]:
-    """What a statement reads."""
+def operands_of(statement: Statement) -> list[Atom | None]:
+    """What a statement reads, a branch or a loop by itself."""
+    if isinstance(statement, Loop):
+        return []
+    if isinstance(statement, Branch):
+        return [statement.case]
     if isinstance(statement, Define):
         return list(statement.operands)
     if isinstance(statement, Declare):
@@ -309,6 +313,32 @@ def operands_of(statement: Define | Declare | Table | Assign | Leave) -> list[At
     if isinstance(statement, Table):
         return list(statement.entries)
     return [statement.unless] if isinstance(statement, Leave) else [statement.value, statement.index]
+
+
+def each(statements: Iterable[Statement]) -> Iterator[Statement]:
+    """Every statement but loops, those inside loops too."""
+    for s in statements:
+        yield from each(s.body) if isinstance(s, Loop) else (s,)
+
+
+def changed(statements: Iterable[Statement], change: Callable[[Statement], Statement]) -> list[Statement]:
+    """The same with every statement changed but loops, those inside loops too."""
+    return [Loop(changed(s.body, change)) if isinstance(s, Loop) else change(s) for s in statements]
+
+
+def with_operands(s: Statement, given: Mapping[Atom, Atom]) -> Statement:
+    """A statement that reads others in place of some variables."""
+    if isinstance(s, Define):
+        return Define(s.target, s.operation, tuple(given.get(a, a) for a in s.operands))
+    if isinstance(s, Table):
+        return Table(s.target, tuple(given.get(a, a) for a in s.entries))
+    if isinstance(s, Leave):
+        return Leave(given.get(s.unless, s.unless))
+    if isinstance(s, Declare) and s.start is not None:
+        return Declare(s.target, given.get(s.start, s.start), s.size)
+    if isinstance(s, Assign):
+        return Assign(s.target, given.get(s.value, s.value), s.index and given.get(s.index, s.index))
+    return s
 
 
 def names(atoms: Iterable[Atom | None]) -> set[str]:
@@ -323,7 +353,6 @@ def names_in(statements: Iterable[Statement]) -> set[str]:
         if isinstance(statement, Loop):
             used |= names_in(statement.body)
         elif isinstance(statement, Branch):
-            used |= names([statement.case]).union(*map(names_in, statement.bodies))
-        else:
-            used |= names(operands_of(statement))
+            used = used.union(*map(names_in, statement.bodies))
+        used |= names(operands_of(statement))
     return used

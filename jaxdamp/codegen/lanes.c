@@ -11,9 +11,9 @@
 #define VECTOR 4
 #endif
 /* Over all points of a block, in one or four vectors side by side. */
-#define IN_TURN                                       \
-    for (int base = 0; base < LANES; base += @vectors@ * VECTOR) \
-        _Pragma("omp simd") for (int lanea = base; lanea < base + VECTOR; lanea++)
+#define GROUPS for (int base = 0; base < LANES; base += @vectors@ * VECTOR)
+#define PRAGMA(text) _Pragma(#text)
+#define IN_TURN(...) PRAGMA(omp simd __VA_ARGS__) for (int lanea = base; lanea < base + VECTOR; lanea++)
 #define OTHERS const int laneb = lanea + VECTOR, lanec = laneb + VECTOR, laned = lanec + VECTOR
 #define ROW(name, count) double name[(count) ? (count) : 1][LANES] __attribute__((aligned(64)))
 
@@ -34,6 +34,7 @@ VECTORS double log1p(double);
 #endif
 
 enum { SHARED = @shared@, OWN = @own@, NOW = @now@, STATE = @state@, ROWS = @rows@, HOISTED = @hoisted@, KEPT = @kept@ };
+enum { PASSED = @passed@ };
 
 /* shared and own: numbers of all points, and of each point; now and state: what is carried from step to step, the same
    for all points, and of each. Numbers of points lie one after the other, (number, point). */
@@ -49,6 +50,7 @@ static void run(const double *restrict shared, const double *restrict own_in, co
         ROW(state, STATE);
         ROW(hoisted, HOISTED);
         ROW(kept, KEPT); /* of the step before */
+        ROW(passed, PASSED); /* from before a loop inside a step to after it */
         double now[NOW ? NOW : 1];
         /* lanes without a point of their own repeat the last */
         for (int i = 0; i < OWN; i++)
@@ -60,7 +62,7 @@ static void run(const double *restrict shared, const double *restrict own_in, co
         for (int i = 0; i < NOW; i++)
             now[i] = now_in[i];
         for (int lane = 0; lane < LANES; lane++) {
-            (void)own, (void)kept;
+            (void)own, (void)kept, (void)passed;
 @of_point@
         }
         for (int64_t step = 0; step < steps; step++) {
@@ -68,13 +70,11 @@ static void run(const double *restrict shared, const double *restrict own_in, co
             (void)row;
 @of_step@
             if (@simple@) {
-                IN_TURN {
-                    OTHERS;
+                GROUPS {
 @of_simple@
                 }
             } else {
-                IN_TURN {
-                    OTHERS;
+                GROUPS {
 @of_both@
                 }
             }

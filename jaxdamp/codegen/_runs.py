@@ -1,0 +1,236 @@
+"""What a step computes of each point: for one in a thread, and for many side by side in vectors.
+
+Vectors follow no loop of a single point. A step is therefore divided into straight runs around its loops; each loop
+goes on until all points of some vectors are done, while those that are done keep their values.
+"""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import count
+from typing import NamedTuple, TypeAlias, final
+
+from jaxdamp.codegen._languages import C
+from jaxdamp.codegen._program import (
+    Assign,
+    Atom,
+    Branch,
+    Constant,
+    Declare,
+    Define,
+    Leave,
+    Loop,
+    Statement,
+    Table,
+    Variable,
+    operands_of,
+)
+
+
+VECTORS = "abcd"  # of a block that a step takes in turn, operation by operation: each waits for its own last result
+LONG = 700  # lines of a run that keep a processor busy with one vector, and a compiler with four for minutes
+# {1} is not NaN; a NaN of {0} is the result, as that of the second operand of a vector minimum is
+LIMITS = {"min": "{1} < {0} ? {1} : {0}", "max": "{1} > {0} ? {1} : {0}"}
+# NaN of either operand is the result; "or" would be a choice between conditions, for which gcc has no vectors
+_BEYOND = {
+    name: f"{{0}} != {{0}} ? {{0}} : {{0}} {sign} {{1}} ? {{0}} : {{1}}" for name, sign in (("max", ">"), ("min", "<"))
+}
+
+
+class OfPoint(C):
+    """C with limits that are the same in all steps, and conditions as numbers by a choice: a cast is no vector."""
+
+    def own(self, operation: str, texts: list[str], dtypes: list[str], dtype: str) -> str | None:
+        """As in C."""
+        if operation == "convert" and dtypes == ["bool"] and dtype == "float64":
+            return f"{texts[0]} ? 1.0 : 0.0"
+        first, _, limit = operation.partition("limiting ")
+        return super().own(operation, texts, dtypes, dtype) if first else LIMITS[limit].format(*texts)
+
+
+@final
+class _InVectors(OfPoint):
+    """The same with whole numbers as double ones, so that all of a vector have one width."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.types = {name: "bool" if name == "bool" else "double" for name in self.types}
+
+    def number(self, atom: Constant) -> str:
+        """Whole numbers with a point."""
+        whole = atom.dtype != "bool" and not atom.dtype.startswith("float")
+        return super().number(Constant(f"{atom.text}.0", "float64") if whole else atom)
+
+    def own(self, operation: str, texts: list[str], dtypes: list[str], dtype: str) -> str | None:
+        """What whole numbers need of their own; quotients and bits of them are refused."""
+        if operation in _BEYOND and dtype == "float64":
+            return _BEYOND[operation].format(*texts)
+        if operation == "look_up":
+            return f"{texts[0]}[(int){texts[1]}]"
+        if operation == "convert" and dtype != "bool":
+            kept = "trunc({0})" if dtypes[0].startswith("float") and not dtype.startswith("float") else "{0}"
+            return f"{texts[0]} ? 1.0 : 0.0" if dtypes[0] == "bool" else kept.format(texts[0])
+        if "int" in dtype and operation in ("div", "rem", "and", "or", "xor", "not", "pow"):
+            message = f"The operation {operation!r} of whole numbers cannot be printed for many points side by side."
+            raise NotImplementedError(message)
+        return super().own(operation, texts, dtypes, dtype)
+
+
+class Step(NamedTuple):
+    """What depends on point and step."""
+
+    places: dict[Variable, str]  # where values are that were computed before
+    statements: list[Statement]
+    ends: list[tuple[str, Atom]]  # targets, and what they become at the end, all at once
+
+    def lines(self) -> list[str]:
+        """C for one point."""
+        printer = OfPoint()
+        load = [f"const {printer.types[v.dtype]} {v.name} = {place};" for v, place in self.places.items()]
+        ends = assigned((target, printer.atom(value)) for target, value in self.ends)
+        return [*load, *printer.lines(self.statements, 0), *ends]
+
+
+def assigned(pairs: Iterable[tuple[str, str]]) -> list[str]:
+    """Assignments all at once: values are read before any of the targets changes."""
+    pairs = list(pairs)
+    copies = [f"const double after{i} = {value};" for i, (_, value) in enumerate(pairs)]
+    return copies + [f"{target} = after{i};" for i, (target, _) in enumerate(pairs)]
+
+
+class _Next(NamedTuple):
+    """A new value where a loop goes on."""
+
+    target: Variable
+    value: Atom
+    going: Variable
+
+
+_Straight: TypeAlias = Define | Declare | Table | _Next
+
+
+class _Run(NamedTuple):
+    """Statements without loops."""
+
+    statements: list[_Straight]
+    going: Variable | None = None  # which points go on, if these are the first statements of a loop's body
+    ends: Sequence[tuple[str, Atom]] = ()
+
+    def reads(self) -> dict[str, Variable]:
+        """What comes from elsewhere."""
+        atoms = [a for s in self.statements for a in (s if isinstance(s, _Next) else operands_of(s))]
+        atoms += [value for _, value in self.ends]
+        defined = {s.target.name for s in self.statements if isinstance(s, Define | Table)}
+        return {a.name: a for a in atoms if isinstance(a, Variable) and a.name not in defined}
+
+
+_Body: TypeAlias = "list[_Run | _Body]"  # runs and loops
+
+
+def in_vectors(steps: Mapping[str, Step]) -> dict[str, str | list[str]]:
+    """The lines of each step for points side by side, how many vectors take turns, how many numbers pass between runs.
+
+    Raises:
+        NotImplementedError: branches, arrays of a point, and operations of whole numbers that vectors have not.
+    """
+    divided = {name: _Divided(step) for name, step in steps.items()}
+    vectors = VECTORS[: 4 if max(step.longest for step in divided.values()) <= LONG else 1]
+    lines: dict[str, str | list[str]] = {name: [*step.lines(vectors)] for name, step in divided.items()}
+    return lines | {"vectors": str(len(vectors)), "passed": str(max(len(step.passed) for step in divided.values()))}
+
+
+@final
+class _Divided:
+    """A step in runs, which pass numbers to each other in memory."""
+
+    def __init__(self, step: Step) -> None:
+        self._count, self._step = count(), step
+        self._body = self._divided(step.statements, None, step.ends)
+        runs = [*_runs(self._body)]
+        written = {s.target.name: s.target for run in runs for s in run.statements}
+        read = {name: written[name] for run in runs for name in run.reads() if name in written}
+        self.passed = {variable: f"passed[{i}][lane]" for i, variable in enumerate(read.values())}
+        self._printed = {id(run): [*self._lines_of(run)] for run in runs}
+        self.longest = max(map(len, self._printed.values()))
+
+    def lines(self, vectors: str) -> Iterator[str]:
+        """The step for so many vectors."""
+        return self._lines(self._body, vectors)
+
+    def _divided(
+        self, statements: list[Statement], going: Variable | None, ends: Sequence[tuple[str, Atom]] = ()
+    ) -> _Body:
+        body: _Body = []
+        run: list[_Straight] = []
+        for s in statements:
+            if isinstance(s, Loop):
+                body += [_Run(run), self._divided(s.body, going)]
+                run = []
+            elif isinstance(s, Leave):
+                outside, going = going, Variable(f"going{next(self._count)}", "bool")
+                run.append(Define(going, "and", (outside, s.unless)) if outside else Define(going, "copy", (s.unless,)))
+                body.append(_Run(run, going))
+                run = []
+            elif isinstance(s, Assign) and going and s.index is None:
+                run.append(_Next(s.target, s.value, going))
+            elif isinstance(s, Define | Table) or (isinstance(s, Declare) and s.size is None):
+                run.append(s)
+            else:
+                raise _refused(branch=isinstance(s, Branch))
+        return [*body, _Run(run, None, ends)]
+
+    def _lines_of(self, run: _Run) -> Iterator[str]:
+        """C for one vector."""
+        printer, places = _InVectors(), self.passed | self._step.places
+        for variable in run.reads().values():
+            if variable in places and variable.dtype == "bool":  # gcc has no vectors for choices between conditions
+                yield f"const double {variable.name}_number = {places[variable]};"
+                yield f"const bool {variable.name} = {variable.name}_number != 0.0;"
+            elif variable in places:
+                yield f"const double {variable.name} = {places[variable]};"
+        for s in run.statements:
+            if isinstance(s, Define | Table):
+                yield from printer.lines([s], 0)
+            if s.target not in self.passed:
+                continue
+            if isinstance(s, Table):
+                raise _refused(branch=False)
+            is_bool = s.target.dtype == "bool"
+            value = s.target if isinstance(s, Define) else s.start if isinstance(s, Declare) else s.value
+            text = value and printer.atom(value) + " ? 1.0 : 0.0" * is_bool
+            if isinstance(s, _Next):
+                text = f"{s.going.name} ? ({text}) : {s.target.name}{'_number' * is_bool}"
+            if text:
+                yield f"{places[s.target]} = {text};"
+        if run.going:
+            yield f"going += {run.going.name} ? 1.0 : 0.0;"
+        yield from assigned((target, printer.atom(value)) for target, value in run.ends)
+
+    def _lines(self, body: _Body, vectors: str) -> Iterator[str]:
+        for part in body:
+            if isinstance(part, list):
+                yield from ("for (;;) {", "    double going = 0.0;")
+                yield from ("    " + line for line in self._lines(part, vectors))
+                yield "}"
+            elif lines := self._printed[id(part)]:
+                yield "IN_TURN(reduction(+ : going)) {" if part.going else "IN_TURN() {"
+                yield "    OTHERS;"
+                yield from ("    " + line for line in _in_turn(lines, vectors))
+                yield from ("}", "if (going == 0.0)", "    break;") if part.going else ("}",)
+
+
+def _refused(*, branch: bool) -> NotImplementedError:
+    what = "A branch" if branch else "An array that loops read or write"
+    return NotImplementedError(f"{what} inside a step cannot be printed for many points side by side.")
+
+
+def _runs(body: _Body) -> Iterator[_Run]:
+    for part in body:
+        yield from _runs(part) if isinstance(part, list) else (part,)
+
+
+def _in_turn(lines: Sequence[str], vectors: str) -> Iterator[str]:
+    """Each line for one vector after the other, with names of its own for what it defines."""
+    own = {"lane", *(name for line in lines for name in re.findall(r"^ *const \w+ (\w+)", line))}
+    for line in lines:
+        for vector in vectors:
+            yield re.sub(r"[A-Za-z]\w*", lambda word, v=vector: word[0] + v * (word[0] in own), line)
