@@ -6,12 +6,15 @@ the arguments. When differentiated, their value is selected by the same comparis
 too (see `jaxdamp._elementary` on loops that lose custom derivatives).
 """
 
+from collections.abc import Callable
+
 import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, ArrayLike, Float
 
 from jaxdamp._types import ScalarLike
+from jaxdamp.codegen import is_printing_vectors
 
 
 Numbers = Float[Array, "..."]
@@ -42,18 +45,28 @@ def largest(numbers: Numbers, axis: int = 0) -> Numbers:
 
 
 def _selected(
-    values: tuple[Numbers, Numbers], lead: Numbers, changes: tuple[Numbers, Numbers]
+    select: Callable[[Numbers, Numbers], Numbers],
+    values: tuple[Numbers, Numbers],
+    lead: Numbers,
+    changes: tuple[Numbers, Numbers],
 ) -> tuple[Numbers, Numbers]:
     """The selected value and its change; for equal values the mean of both."""
     one, other = (jnp.asarray(value, lead.dtype) for value in values)
-    ans = jnp.where(lead > 0, one, jnp.where(lead < 0, other, 0.5 * one + 0.5 * other))
-    share = jnp.where(lead > 0, 1.0, jnp.where(lead < 0, 0.0, 0.5)).astype(ans.dtype)
+    if is_printing_vectors():  # no second derivatives
+        ans = select(one, other)
+    else:
+        ans = jnp.where(lead > 0, one, jnp.where(lead < 0, other, 0.5 * one + 0.5 * other))
+    share = jnp.where(lead > 0, 1.0, 0.0 if is_printing_vectors() else jnp.where(lead < 0, 0.0, 0.5)).astype(ans.dtype)
     parts = zip((share, 1.0 - share), changes, strict=True)
     return ans, sum((part * change for part, change in parts if type(change) is not SymbolicZero), jnp.zeros_like(ans))
 
 
-at_least.defjvp(lambda values, changes: _selected(values, values[0] - values[1], changes), symbolic_zeros=True)
-at_most.defjvp(lambda values, changes: _selected(values, values[1] - values[0], changes), symbolic_zeros=True)
+at_least.defjvp(
+    lambda values, changes: _selected(jnp.maximum, values, values[0] - values[1], changes), symbolic_zeros=True
+)
+at_most.defjvp(
+    lambda values, changes: _selected(jnp.minimum, values, values[1] - values[0], changes), symbolic_zeros=True
+)
 
 
 def root(power: Numbers, order: int = 2) -> Numbers:

@@ -92,7 +92,8 @@ def increasing_root(
 
         start = jnp.ones_like(w, bool)
         for _ in range(likely if target().fused_loops else 0):  # written out they are fast, but take longer to compile
-            before, w = w, jnp.clip(newton(w, constants)[2], low, high)
+            before, w = w, newton(w, constants)[2]
+            w = jnp.where(w < low, low, jnp.where(w > high, high, w))  # not NaN, or the function is
             start = moved(before, w)
         begin = varying_as((0, start, (w, low, high, never, never)))
         return jax.lax.while_loop(going, again, begin)[2][0], ()

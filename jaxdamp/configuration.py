@@ -124,7 +124,8 @@ def one_at_a_time() -> AbstractContextManager[None]:
 def target() -> Target:
     """What the function that is being traced is compiled for; by default this process, see `_this_process`."""
     if is_printing():
-        return _PRINTED._replace(library_powers=not is_printing_vectors())
+        vectors = is_printing_vectors()
+        return _PRINTED._replace(library_powers=not vectors, fused_loops=vectors)
     return _OTHER_TARGET.value or _this_process()
 
 

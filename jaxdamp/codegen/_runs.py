@@ -31,9 +31,7 @@ LONG = 700  # lines of a run that keep a processor busy with one vector, and a c
 # {1} is not NaN; a NaN of {0} is the result, as that of the second operand of a vector minimum is
 LIMITS = {"min": "{1} < {0} ? {1} : {0}", "max": "{1} > {0} ? {1} : {0}"}
 # NaN of either operand is the result; "or" would be a choice between conditions, for which gcc has no vectors
-_BEYOND = {
-    name: f"{{0}} != {{0}} ? {{0}} : {{0}} {sign} {{1}} ? {{0}} : {{1}}" for name, sign in (("max", ">"), ("min", "<"))
-}
+_BEYOND = {name: f"{{1}} != {{1}} ? {{1}} : {test}" for name, test in LIMITS.items()}
 
 
 class OfPoint(C):
@@ -231,6 +229,8 @@ def _runs(body: _Body) -> Iterator[_Run]:
 def _in_turn(lines: Sequence[str], vectors: str) -> Iterator[str]:
     """Each line for one vector after the other, with names of its own for what it defines."""
     own = {"lane", *(name for line in lines for name in re.findall(r"^ *const \w+ (\w+)", line))}
-    for line in lines:
-        for vector in vectors:
+    import os
+    n = int(os.environ.get("CHUNK", "1"))
+    for at in range(0, len(lines), n):
+        for vector, line in ((v, l) for v in vectors for l in lines[at : at + n]):
             yield re.sub(r"[A-Za-z]\w*", lambda word, v=vector: word[0] + v * (word[0] in own), line)

@@ -8,7 +8,7 @@ from typing import final
 import numpy as np
 
 from jaxdamp._elementary import reciprocal_root
-from jaxdamp._limits import at_least, at_most
+from jaxdamp._limits import at_most
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers._guesses import secant_rate
 from jaxdamp.dampers.base import AbstractMemoryless, Condition, Reach
@@ -74,7 +74,7 @@ class Besinger(AbstractMemoryless):
         """Force [N] at velocity v [m/s]."""
         closed = at_most(v, self.limit_velocity)
         rate = transition_rate(closed, self.compression_rate, self.rebound_rate, self.transition_velocity)
-        return rate * closed + self.blow_off_rate * at_least(v - self.limit_velocity, 0.0)
+        return rate * closed + self.blow_off_rate * (v - closed)
 
     def conditions(self) -> tuple[Condition, ...]:
         """The force increases with the velocity."""
