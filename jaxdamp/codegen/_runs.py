@@ -229,8 +229,6 @@ def _runs(body: _Body) -> Iterator[_Run]:
 def _in_turn(lines: Sequence[str], vectors: str) -> Iterator[str]:
     """Each line for one vector after the other, with names of its own for what it defines."""
     own = {"lane", *(name for line in lines for name in re.findall(r"^ *const \w+ (\w+)", line))}
-    import os
-    n = int(os.environ.get("CHUNK", "1"))
-    for at in range(0, len(lines), n):
-        for vector, line in ((v, l) for v in vectors for l in lines[at : at + n]):
+    for line in lines:
+        for vector in vectors:
             yield re.sub(r"[A-Za-z]\w*", lambda word, v=vector: word[0] + v * (word[0] in own), line)
