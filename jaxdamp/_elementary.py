@@ -113,3 +113,20 @@ def _reciprocal_root_slope(primals: tuple[Numbers], tangents: tuple[Numbers]) ->
     (x,), (change,) = primals, tangents
     root = _reciprocal_root(x)
     return root, (-0.5 * root * root * root) * change
+
+
+def algebraic_sigmoid(x: Float[ArrayLike, "..."]) -> Numbers:
+    """x/√(1+x²), from −1 to 1; its derivative, (1+x²)^(−3/2), takes neither a root nor a quotient."""
+    return _algebraic_sigmoid(jnp.asarray(x))
+
+
+@jax.custom_jvp
+def _algebraic_sigmoid(x: Numbers) -> Numbers:
+    return x * _reciprocal_root(1.0 + x * x)
+
+
+@_algebraic_sigmoid.defjvp
+def _algebraic_sigmoid_slope(primals: tuple[Numbers], tangents: tuple[Numbers]) -> tuple[Numbers, Numbers]:
+    (x,), (change,) = primals, tangents
+    root = _reciprocal_root(1.0 + x * x)
+    return x * root, root * root * root * change

@@ -10,7 +10,7 @@ import optimistix as optx
 from jax.extend.core import ClosedJaxpr, jaxpr_as_fun
 from jaxtyping import Array, Bool, PyTree
 
-from jaxdamp._limits import at_most, within
+from jaxdamp._limits import at_most, between_numbers, within
 from jaxdamp._matrices import solve
 from jaxdamp._sharded import varying_as
 from jaxdamp._types import Scalar, ScalarLike
@@ -92,8 +92,7 @@ def increasing_root(
 
         start = jnp.ones_like(w, bool)
         for _ in range(likely if target().fused_loops else 0):  # written out they are fast, but take longer to compile
-            before, w = w, newton(w, constants)[2]
-            w = jnp.where(w < low, low, jnp.where(w > high, high, w))  # not NaN, or the function is
+            before, w = w, between_numbers(newton(w, constants)[2], low, high)
             start = moved(before, w)
         begin = varying_as((0, start, (w, low, high, never, never)))
         return jax.lax.while_loop(going, again, begin)[2][0], ()

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from jaxdamp import _checks
-from jaxdamp._limits import within
+from jaxdamp._limits import between_numbers, within
 from jaxdamp._root import increasing_root
 from jaxdamp._types import Scalar, ScalarLike, State
 from jaxdamp.dampers._steps import GAMMA, sdirk2
@@ -159,7 +159,7 @@ class AbstractSeries(AbstractWrapper):
         limit = (jnp.abs(free) + reach) / duration + jnp.finfo(free.dtype).tiny
         velocity = increasing_root(
             lambda w: law_force(w) - spring_force(deflections(w)),
-            within(now.guess, -limit, limit),
+            between_numbers(now.guess, -limit, limit),
             -limit,
             limit,
             steps=MOST_STEPS,

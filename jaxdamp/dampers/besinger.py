@@ -7,7 +7,7 @@ from typing import final
 
 import numpy as np
 
-from jaxdamp._elementary import reciprocal_root
+from jaxdamp._elementary import algebraic_sigmoid
 from jaxdamp._limits import at_most
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers._guesses import secant_rate
@@ -26,7 +26,7 @@ def transition_rate(
     u = v * (1.0 / transition_velocity) - 1.0  # a product, since quotients are slow, also in derivatives
     c1 = 0.5 * (rebound_rate - compression_rate)
     c2 = 0.5 * (rebound_rate + compression_rate)
-    return c1 * u * reciprocal_root(1.0 + u * u) + c2
+    return c1 * algebraic_sigmoid(u) + c2
 
 
 LEAST_COMPRESSION = 0.0067  # C_c/C_e below which the force decreases with v in compression; exactly 0.00664

@@ -6,7 +6,7 @@ from typing import final
 import jax.numpy as jnp
 import numpy as np
 
-from jaxdamp._elementary import power, reciprocal_root
+from jaxdamp._elementary import algebraic_sigmoid, power
 from jaxdamp._limits import at_least, within
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._guesses import sliding_fit
@@ -55,7 +55,7 @@ def hysteresis_step(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, expone
     steep = 1.0 + curve * jnp.where(w < 0, begin * power(0.5, exponent), 0.0)
     left = at_least(u - held / steep, 0.0)
     half = 0.5 * left * _rate_factor(loaded, jnp.where(w > 0, begin, 0.0), exponent)
-    t = half * reciprocal_root(1.0 + half * half)
+    t = algebraic_sigmoid(half)
     loading = (loaded + t) / (1.0 + loaded * t)
 
     midway = power(jnp.where(stays, unloading, loading), exponent)

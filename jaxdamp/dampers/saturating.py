@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp._elementary import reciprocal_root
+from jaxdamp._elementary import algebraic_sigmoid
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers._guesses import knee_scan
 from jaxdamp.dampers.base import AbstractMemoryless
@@ -22,7 +22,7 @@ Numbers = Float[Array, "..."]
 SHAPES: dict[str, Callable[[Numbers], Numbers]] = {
     "tanh": jnp.tanh,
     "arctan": lambda u: (2.0 / np.pi) * jnp.arctan((0.5 * np.pi) * u),
-    "algebraic": lambda u: u * reciprocal_root(1.0 + u * u),
+    "algebraic": algebraic_sigmoid,
 }
 
 
