@@ -102,6 +102,11 @@ class _Next(NamedTuple):
     value: Atom
     going: Variable
 
+    @property
+    def after(self) -> Variable:
+        """The new value, or the old one."""
+        return Variable(f"{self.target.name}_next", self.target.dtype)
+
 
 _Straight: TypeAlias = Define | Declare | Table | _Next
 
@@ -110,7 +115,7 @@ class _Run(NamedTuple):
     """Statements without loops."""
 
     statements: list[_Straight]
-    going: Variable | None = None  # which points go on, if these are the first statements of a loop's body
+    going: Variable | None = None  # which points begin a loop that follows, or go on with the one that ends here
     ends: Sequence[tuple[str, Atom]] = ()
 
     def reads(self) -> dict[str, Variable]:
@@ -118,10 +123,18 @@ class _Run(NamedTuple):
         atoms = [a for s in self.statements for a in (s if isinstance(s, _Next) else operands_of(s))]
         atoms += [value for _, value in self.ends]
         defined = {s.target.name for s in self.statements if isinstance(s, Define | Table)}
+        defined |= {s.after.name for s in self.statements if isinstance(s, _Next)}
         return {a.name: a for a in atoms if isinstance(a, Variable) and a.name not in defined}
 
 
-_Body: TypeAlias = "list[_Run | _Body]"  # runs and loops
+class _Repeated(NamedTuple):
+    """A loop, entered where one of the points of some vectors goes on."""
+
+    going: Variable
+    body: "list[_Run | _Repeated]"
+
+
+_Body: TypeAlias = list[_Run | _Repeated]
 
 
 def in_vectors(steps: Mapping[str, Step]) -> dict[str, str | list[str]]:
@@ -157,16 +170,27 @@ class _Divided:
     def _divided(
         self, statements: list[Statement], going: Variable | None, ends: Sequence[tuple[str, Atom]] = ()
     ) -> _Body:
+        """Runs and loops; where a loop goes on is known at the end of the run before it, and of its own last run."""
         body: _Body = []
         run: list[_Straight] = []
         for s in statements:
             if isinstance(s, Loop):
-                body += [_Run(run), self._divided(s.body, going)]
-                run = []
-            elif isinstance(s, Leave):
-                outside, going = going, Variable(f"going{next(self._count)}", "bool")
-                run.append(Define(going, "and", (outside, s.unless)) if outside else Define(going, "copy", (s.unless,)))
-                body.append(_Run(run, going))
+                inner = Variable(f"going{next(self._count)}", "bool")
+                place = next((i for i, part in enumerate(s.body) if isinstance(part, Leave)), 0)
+                condition, leave, rest = s.body[:place], s.body[place], s.body[place + 1 :]
+                assert isinstance(leave, Leave)
+                starts: dict[Atom, Atom] = {
+                    r.target: r.start for r in run if isinstance(r, Declare) and r.start is not None
+                }
+                test, goes = _tested(condition, leave, starts, "_first")
+                operands = (going, goes) if going else (goes,)
+                run += [*test, Define(inner, "and" if going else "copy", operands)]
+                *parts, last = self._divided(rest, inner)
+                assert isinstance(last, _Run)
+                after: dict[Atom, Atom] = {n.target: n.after for n in last.statements if isinstance(n, _Next)}
+                test, goes = _tested(condition, leave, after, "_again")
+                last = _Run([*last.statements, *test, _Next(inner, goes, inner)], inner)
+                body += [_Run(run, inner), _Repeated(inner, [*parts, last])]
                 run = []
             elif isinstance(s, Assign) and going and s.index is None:
                 run.append(_Next(s.target, s.value, going))
@@ -186,34 +210,63 @@ class _Divided:
             elif variable in places:
                 yield f"const double {variable.name} = {places[variable]};"
         for s in run.statements:
+            number = "_number" * (s.target.dtype == "bool")
             if isinstance(s, Define | Table):
                 yield from printer.lines([s], 0)
+            elif isinstance(s, _Next):
+                value = printer.atom(s.value) + " ? 1.0 : 0.0" * bool(number)
+                yield f"const double {s.after.name}{number} = {s.going.name} ? ({value}) : {s.target.name}{number};"
+                yield from [f"const bool {s.after.name} = {s.after.name}{number} != 0.0;"] * bool(number)
             if s.target not in self.passed:
                 continue
             if isinstance(s, Table):
                 raise _refused(branch=False)
-            is_bool = s.target.dtype == "bool"
-            value = s.target if isinstance(s, Define) else s.start if isinstance(s, Declare) else s.value
-            text = value and printer.atom(value) + " ? 1.0 : 0.0" * is_bool
-            if isinstance(s, _Next):
-                text = f"{s.going.name} ? ({text}) : {s.target.name}{'_number' * is_bool}"
-            if text:
-                yield f"{places[s.target]} = {text};"
+            value = s.target if isinstance(s, Define) else s.after if isinstance(s, _Next) else s.start
+            if value is not None:
+                yield f"{places[s.target]} = {printer.atom(value)}{' ? 1.0 : 0.0' * bool(number)};"
         if run.going:
-            yield f"going += {run.going.name} ? 1.0 : 0.0;"
+            ends_loop = any(isinstance(s, _Next) and s.target == run.going for s in run.statements)
+            yield f"{_points(run.going)} += {run.going.name}{'_next' * ends_loop} ? 1.0 : 0.0;"
         yield from assigned((target, printer.atom(value)) for target, value in run.ends)
 
-    def _lines(self, body: _Body, vectors: str) -> Iterator[str]:
+    def _lines(self, body: _Body, vectors: str, inside: Variable | None = None) -> Iterator[str]:
         for part in body:
-            if isinstance(part, list):
-                yield from ("for (;;) {", "    double going = 0.0;")
-                yield from ("    " + line for line in self._lines(part, vectors))
+            if isinstance(part, _Repeated):
+                yield f"while ({_points(part.going)} > 0.0) {{"
+                yield from ("    " + line for line in self._lines(part.body, vectors, part.going))
                 yield "}"
             elif lines := self._printed[id(part)]:
-                yield "IN_TURN(reduction(+ : going)) {" if part.going else "IN_TURN() {"
-                yield "    OTHERS;"
-                yield from ("    " + line for line in _in_turn(lines, vectors))
-                yield from ("}", "if (going == 0.0)", "    break;") if part.going else ("}",)
+                if part.going:
+                    yield f"{'double ' * (part.going != inside)}{_points(part.going)} = 0.0;"
+                yield f"IN_TURN({f'reduction(+ : {_points(part.going)})' if part.going else ''}) {{"
+                yield from ("    " + line for line in ("OTHERS;", *_in_turn(lines, vectors)))
+                yield "}"
+
+
+def _tested(
+    condition: list[Statement], leave: Leave, known: Mapping[Atom, Atom], suffix: str
+) -> tuple[list[_Straight], Atom]:
+    """The condition of a loop with known values of its variables, and its result."""
+    known, test = dict(known), list[_Straight]()
+    for s in condition:
+        if not isinstance(s, Define):
+            raise NotImplementedError(
+                "A loop in the condition of a loop cannot be printed for many points side by side."
+            )
+        known[s.target] = Variable(s.target.name + suffix, s.target.dtype)
+        test.append(
+            Define(
+                Variable(s.target.name + suffix, s.target.dtype),
+                s.operation,
+                tuple(known.get(a, a) for a in s.operands),
+            )
+        )
+    return test, known.get(leave.unless, leave.unless)
+
+
+def _points(going: Variable) -> str:
+    """The number of points that go on."""
+    return f"points_{going.name}"
 
 
 def _refused(*, branch: bool) -> NotImplementedError:
@@ -223,7 +276,7 @@ def _refused(*, branch: bool) -> NotImplementedError:
 
 def _runs(body: _Body) -> Iterator[_Run]:
     for part in body:
-        yield from _runs(part) if isinstance(part, list) else (part,)
+        yield from _runs(part.body) if isinstance(part, _Repeated) else (part,)
 
 
 def _in_turn(lines: Sequence[str], vectors: str) -> Iterator[str]:
