@@ -22,7 +22,10 @@ from jaxdamp.codegen._program import (
     Statement,
     Table,
     Variable,
+    constant,
+    names_in,
     operands_of,
+    pruned,
 )
 
 
@@ -175,22 +178,7 @@ class _Divided:
         run: list[_Straight] = []
         for s in statements:
             if isinstance(s, Loop):
-                inner = Variable(f"going{next(self._count)}", "bool")
-                place = next((i for i, part in enumerate(s.body) if isinstance(part, Leave)), 0)
-                condition, leave, rest = s.body[:place], s.body[place], s.body[place + 1 :]
-                assert isinstance(leave, Leave)
-                starts: dict[Atom, Atom] = {
-                    r.target: r.start for r in run if isinstance(r, Declare) and r.start is not None
-                }
-                test, goes = _tested(condition, leave, starts, "_first")
-                operands = (going, goes) if going else (goes,)
-                run += [*test, Define(inner, "and" if going else "copy", operands)]
-                *parts, last = self._divided(rest, inner)
-                assert isinstance(last, _Run)
-                after: dict[Atom, Atom] = {n.target: n.after for n in last.statements if isinstance(n, _Next)}
-                test, goes = _tested(condition, leave, after, "_again")
-                last = _Run([*last.statements, *test, _Next(inner, goes, inner)], inner)
-                body += [_Run(run, inner), _Repeated(inner, [*parts, last])]
+                body += self._entered(s, run, going)
                 run = []
             elif isinstance(s, Assign) and going and s.index is None:
                 run.append(_Next(s.target, s.value, going))
@@ -199,6 +187,23 @@ class _Divided:
             else:
                 raise _refused(branch=isinstance(s, Branch))
         return [*body, _Run(run, None, ends)]
+
+    def _entered(self, loop: Loop, run: list[_Straight], outside: Variable | None) -> _Body:
+        """A loop, and the run before it, which knows where it is entered."""
+        going = Variable(f"going{next(self._count)}", "bool")
+        place = next(i for i, s in enumerate(loop.body) if isinstance(s, Leave))
+        condition, leave, rest = loop.body[:place], loop.body[place], loop.body[place + 1 :]
+        starts = {s.target: s.start for s in run if isinstance(s, Declare)}
+        test, goes = _tested(condition, leave, starts, "_first")
+        run = [*run, *test, Define(going, "and", (goes, outside or constant(True, "bool")))]
+        # the rest may read what the condition has computed
+        *parts, last = self._divided([*pruned(condition, names_in(rest)), *rest], going)
+        assert isinstance(last, _Run)
+        test, goes = _tested(
+            condition, leave, {s.target: s.after for s in last.statements if isinstance(s, _Next)}, "_again"
+        )
+        last = _Run([*last.statements, *test, _Next(going, goes, going)], going)
+        return [_Run(run, going), _Repeated(going, [*parts, last])]
 
     def _lines_of(self, run: _Run) -> Iterator[str]:
         """C for one vector."""
@@ -244,23 +249,19 @@ class _Divided:
 
 
 def _tested(
-    condition: list[Statement], leave: Leave, known: Mapping[Atom, Atom], suffix: str
+    condition: list[Statement], leave: Statement, given: Mapping[Variable, Atom | None], suffix: str
 ) -> tuple[list[_Straight], Atom]:
-    """The condition of a loop with known values of its variables, and its result."""
-    known, test = dict(known), list[_Straight]()
+    """The condition of a loop for given values of its variables, and its result."""
+    known: dict[Atom, Atom] = {variable: value for variable, value in given.items() if value is not None}
+    test: list[_Straight] = []
     for s in condition:
         if not isinstance(s, Define):
-            raise NotImplementedError(
-                "A loop in the condition of a loop cannot be printed for many points side by side."
-            )
-        known[s.target] = Variable(s.target.name + suffix, s.target.dtype)
-        test.append(
-            Define(
-                Variable(s.target.name + suffix, s.target.dtype),
-                s.operation,
-                tuple(known.get(a, a) for a in s.operands),
-            )
-        )
+            message = "A loop in the condition of a loop cannot be printed for many points side by side."
+            raise NotImplementedError(message)
+        target = Variable(s.target.name + suffix, s.target.dtype)
+        test.append(Define(target, s.operation, tuple(known.get(a, a) for a in s.operands)))
+        known[s.target] = target
+    assert isinstance(leave, Leave)
     return test, known.get(leave.unless, leave.unless)
 
 
