@@ -135,7 +135,8 @@ def _levels(statements: Iterable[Statement], known: dict[str, int]) -> dict[str,
             level = 0
             for atom in operands_of(statement):
                 level |= _level(atom, levels)
-            levels[statement.target.name] = level
+            in_step = isinstance(statement, Table) and level & OF_POINT  # an array is not passed on to steps
+            levels[statement.target.name] = OF_BOTH if in_step else level
     return levels
 
 
