@@ -10,7 +10,7 @@ from jaxdamp.codegen import _arrays, _program
 from jaxdamp.codegen._branches import where, without_need
 from jaxdamp.codegen._jaxprs import Inner, printing
 from jaxdamp.codegen._languages import FUNCTIONS
-from jaxdamp.codegen._loop_passes import Kept, kept_values, sums_of_products
+from jaxdamp.codegen._loop_passes import Kept, kept_values, sums_of_products, with_operands
 from jaxdamp.codegen._lowering import evaluated
 from jaxdamp.codegen._program import (
     Atom,
@@ -30,7 +30,6 @@ from jaxdamp.codegen._program import (
     names_in,
     operands_of,
     pruned,
-    with_operands,
 )
 from jaxdamp.codegen._runs import LIMITS, OfPoint, Step, assigned, in_vectors
 
@@ -140,18 +139,32 @@ def _levels(statements: Iterable[Statement], known: dict[str, int]) -> dict[str,
     return levels
 
 
+class _Cheaper(NamedTuple):
+    """Statements that passes have made cheaper, with what these are based on."""
+
+    statements: list[Statement]
+    carried: dict[str, Atom]
+    repeated: list[Kept]
+    limits: dict[str, Variable]
+    conditions: dict[str, bool]
+
+
+def _cheaper(statements: list[Statement], levels: dict[str, int], carried: dict[str, Atom]) -> _Cheaper:
+    """What a step computes, in fewer operations; left as it is if it has branches."""
+    if any(isinstance(s, Branch) for s in each(statements)):
+        return _Cheaper(statements, carried, [], {}, {})
+    repeated, carried, statements = _with_kept(_loaded(statements, levels), levels, carried)
+    inside = {name for name, level in levels.items() if level == OF_BOTH}
+    statements, limits = _limited(sums_of_products(statements, inside, carried), levels)
+    conditions = _without_functions(statements, levels, names(carried.values()))
+    return _Cheaper(statements, carried, repeated, limits, conditions)
+
+
 def _parts(
     statements: list[Statement], levels: dict[str, int], inputs: _Names, before: list[Atoms], after: list[Atoms]
 ) -> tuple[dict[str, str | list[str]], dict[str, Step]]:
     printer = OfPoint()
-    carried = _carried(before, after)
-    repeated, limits, conditions = list[Kept](), dict[str, Variable](), dict[str, bool]()
-    if not any(isinstance(s, Branch) for s in each(statements)):
-        repeated, carried, statements = _with_kept(_loaded(statements, levels), levels, carried)
-        inside = {name for name, level in levels.items() if level == OF_BOTH}
-        statements = sums_of_products(statements, inside, carried)
-        statements, limits = _limited(statements, levels)
-        conditions = _without_functions(statements, levels, names(carried.values()))
+    statements, carried, repeated, limits, conditions = _cheaper(statements, levels, _carried(before, after))
     parts: dict[int, list[Statement]] = {level: [] for level in range(4)}
     parts[OF_BOTH] = _sorted(statements, levels, parts)
     hoisted = _read_later(parts[OF_POINT], parts[OF_BOTH], carried.values())
@@ -160,13 +173,7 @@ def _parts(
     store += printer.lines(dict.fromkeys(s for value in repeated for s in value.first), 0)
     store += [f"{_kept_name(i)} = {value.target.name};" for i, value in enumerate(repeated)]
     ends = [(name, new) for name, new in carried.items() if Variable(name, "float64") != new]
-    simpler = where(parts[OF_BOTH], conditions, names(carried.values())) if conditions else []
-    of_points = [(target, value) for target, value in ends if not target.startswith("now")]
-    places = {v: _hoisted_name(i) for i, v in enumerate(hoisted)}
-    steps = {
-        "of_both": Step(places, parts[OF_BOTH], of_points),
-        "of_simple": Step(places, simpler, of_points if conditions else []),
-    }
+    steps = _steps(parts[OF_BOTH], conditions, {v: _hoisted_name(i) for i, v in enumerate(hoisted)}, ends)
     counts = inputs.counts
     return {
         **{name: str(counts[name]) for name in ("shared", "own", "now", "state")},
@@ -179,6 +186,18 @@ def _parts(
         "simple": _all(conditions),
         "next": assigned((target, printer.atom(value)) for target, value in ends if target.startswith("now")),
     }, steps
+
+
+def _steps(
+    statements: list[Statement], conditions: dict[str, bool], places: dict[Variable, str], ends: list[tuple[str, Atom]]
+) -> dict[str, Step]:
+    """A step, and the same where conditions are what they have to be."""
+    ends = [(target, value) for target, value in ends if not target.startswith("now")]
+    simpler = where(statements, conditions, names(value for _, value in ends))
+    return {
+        "of_both": Step(places, statements, ends),
+        "of_simple": Step(places, simpler, ends) if conditions else Step({}, [], []),
+    }
 
 
 def _all(conditions: dict[str, bool]) -> str:

@@ -6,9 +6,12 @@ from itertools import groupby
 from typing import NamedTuple, TypeGuard
 
 from jaxdamp.codegen._program import (
+    Assign,
     Atom,
     Constant,
+    Declare,
     Define,
+    Leave,
     Loop,
     Statement,
     Table,
@@ -195,3 +198,18 @@ def _chain(target: Variable, terms: list[tuple[bool, Atom]]) -> list[Define]:
         chain.append(Define(to, "sub" if less else "add", (total, atom)))
         total = to
     return chain
+
+
+def with_operands(s: Statement, given: Mapping[Atom, Atom]) -> Statement:
+    """A statement that reads others in place of some variables."""
+    if isinstance(s, Define):
+        return Define(s.target, s.operation, tuple(given.get(a, a) for a in s.operands))
+    if isinstance(s, Table):
+        return Table(s.target, tuple(given.get(a, a) for a in s.entries))
+    if isinstance(s, Leave):
+        return Leave(given.get(s.unless, s.unless))
+    if isinstance(s, Declare) and s.start is not None:
+        return Declare(s.target, given.get(s.start, s.start), s.size)
+    if isinstance(s, Assign):
+        return Assign(s.target, given.get(s.value, s.value), s.index and given.get(s.index, s.index))
+    return s

@@ -1,6 +1,6 @@
 """Programs of scalar statements: what a JAX function is translated to, and what a language prints."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
@@ -324,21 +324,6 @@ def each(statements: Iterable[Statement]) -> Iterator[Statement]:
 def changed(statements: Iterable[Statement], change: Callable[[Statement], Statement]) -> list[Statement]:
     """The same with every statement changed but loops, those inside loops too."""
     return [Loop(changed(s.body, change)) if isinstance(s, Loop) else change(s) for s in statements]
-
-
-def with_operands(s: Statement, given: Mapping[Atom, Atom]) -> Statement:
-    """A statement that reads others in place of some variables."""
-    if isinstance(s, Define):
-        return Define(s.target, s.operation, tuple(given.get(a, a) for a in s.operands))
-    if isinstance(s, Table):
-        return Table(s.target, tuple(given.get(a, a) for a in s.entries))
-    if isinstance(s, Leave):
-        return Leave(given.get(s.unless, s.unless))
-    if isinstance(s, Declare) and s.start is not None:
-        return Declare(s.target, given.get(s.start, s.start), s.size)
-    if isinstance(s, Assign):
-        return Assign(s.target, given.get(s.value, s.value), s.index and given.get(s.index, s.index))
-    return s
 
 
 def names(atoms: Iterable[Atom | None]) -> set[str]:

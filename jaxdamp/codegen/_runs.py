@@ -141,15 +141,14 @@ _Body: TypeAlias = list[_Run | _Repeated]
 
 
 def in_vectors(steps: Mapping[str, Step]) -> dict[str, str | list[str]]:
-    """The lines of each step for points side by side, how many vectors take turns, how many numbers pass between runs.
+    """The lines of each step for points side by side, and how many numbers pass between runs.
 
     Raises:
         NotImplementedError: branches, arrays of a point, and operations of whole numbers that vectors have not.
     """
     divided = {name: _Divided(step) for name, step in steps.items()}
-    vectors = VECTORS[: 4 if max(step.longest for step in divided.values()) <= LONG else 1]
-    lines: dict[str, str | list[str]] = {name: [*step.lines(vectors)] for name, step in divided.items()}
-    return lines | {"vectors": str(len(vectors)), "passed": str(max(len(step.passed) for step in divided.values()))}
+    lines: dict[str, str | list[str]] = {name: [*step.lines()] for name, step in divided.items()}
+    return lines | {"passed": str(max(len(step.passed) for step in divided.values()))}
 
 
 @final
@@ -164,11 +163,10 @@ class _Divided:
         read = {name: written[name] for run in runs for name in run.reads() if name in written}
         self.passed = {variable: f"passed[{i}][lane]" for i, variable in enumerate(read.values())}
         self._printed = {id(run): [*self._lines_of(run)] for run in runs}
-        self.longest = max(map(len, self._printed.values()))
 
-    def lines(self, vectors: str) -> Iterator[str]:
-        """The step for so many vectors."""
-        return self._lines(self._body, vectors)
+    def lines(self) -> Iterator[str]:
+        """The step for all vectors of a block."""
+        return self._lines(self._body)
 
     def _divided(
         self, statements: list[Statement], going: Variable | None, ends: Sequence[tuple[str, Atom]] = ()
@@ -207,45 +205,58 @@ class _Divided:
 
     def _lines_of(self, run: _Run) -> Iterator[str]:
         """C for one vector."""
-        printer, places = _InVectors(), self.passed | self._step.places
-        for variable in run.reads().values():
-            if variable in places and variable.dtype == "bool":  # gcc has no vectors for choices between conditions
-                yield f"const double {variable.name}_number = {places[variable]};"
-                yield f"const bool {variable.name} = {variable.name}_number != 0.0;"
-            elif variable in places:
-                yield f"const double {variable.name} = {places[variable]};"
+        printer = _InVectors()
+        yield from self._loads(run)
         for s in run.statements:
-            number = "_number" * (s.target.dtype == "bool")
             if isinstance(s, Define | Table):
                 yield from printer.lines([s], 0)
             elif isinstance(s, _Next):
-                value = printer.atom(s.value) + " ? 1.0 : 0.0" * bool(number)
-                yield f"const double {s.after.name}{number} = {s.going.name} ? ({value}) : {s.target.name}{number};"
-                yield from [f"const bool {s.after.name} = {s.after.name}{number} != 0.0;"] * bool(number)
-            if s.target not in self.passed:
-                continue
-            if isinstance(s, Table):
-                raise _refused(branch=False)
-            value = s.target if isinstance(s, Define) else s.after if isinstance(s, _Next) else s.start
-            if value is not None:
-                yield f"{places[s.target]} = {printer.atom(value)}{' ? 1.0 : 0.0' * bool(number)};"
+                yield from _moved(s, printer)
+            if s.target in self.passed:
+                if isinstance(s, Table):
+                    raise _refused(branch=False)
+                value = s.target if isinstance(s, Define) else s.after if isinstance(s, _Next) else s.start
+                number = " ? 1.0 : 0.0" * (s.target.dtype == "bool")
+                yield from [f"{self.passed[s.target]} = {printer.atom(value)}{number};"] if value else []
         if run.going:
             ends_loop = any(isinstance(s, _Next) and s.target == run.going for s in run.statements)
             yield f"{_points(run.going)} += {run.going.name}{'_next' * ends_loop} ? 1.0 : 0.0;"
         yield from assigned((target, printer.atom(value)) for target, value in run.ends)
 
-    def _lines(self, body: _Body, vectors: str, inside: Variable | None = None) -> Iterator[str]:
+    def _loads(self, run: _Run) -> Iterator[str]:
+        """What a run reads from memory."""
+        places = self.passed | self._step.places
+        for variable in filter(places.__contains__, run.reads().values()):
+            number = "_number" * (variable.dtype == "bool")
+            yield f"const double {variable.name}{number} = {places[variable]};"
+            if number:
+                yield f"const bool {variable.name} = {variable.name}{number} != 0.0;"
+
+    def _lines(self, body: _Body, inside: Variable | None = None) -> Iterator[str]:
         for part in body:
             if isinstance(part, _Repeated):
                 yield f"while ({_points(part.going)} > 0.0) {{"
-                yield from ("    " + line for line in self._lines(part.body, vectors, part.going))
+                yield from ("    " + line for line in self._lines(part.body, part.going))
                 yield "}"
             elif lines := self._printed[id(part)]:
+                sums = ""
                 if part.going:
                     yield f"{'double ' * (part.going != inside)}{_points(part.going)} = 0.0;"
-                yield f"IN_TURN({f'reduction(+ : {_points(part.going)})' if part.going else ''}) {{"
+                    sums = f"reduction(+ : {_points(part.going)})"
+                vectors = VECTORS if len(lines) <= LONG else VECTORS[:1]
+                yield f"{'IN_TURN' if len(vectors) > 1 else 'ONE_BY_ONE'}({sums}) {{"
                 yield from ("    " + line for line in ("OTHERS;", *_in_turn(lines, vectors)))
                 yield "}"
+
+
+def _moved(s: _Next, printer: C) -> Iterator[str]:
+    """The next value of a variable of a loop; conditions as numbers, since gcc has no vectors for choices of them."""
+    name, after, value = s.target.name, s.after.name, printer.atom(s.value)
+    if s.target.dtype == "bool":
+        yield f"const double {after}_number = {s.going.name} ? ({value} ? 1.0 : 0.0) : {name}_number;"
+        yield f"const bool {after} = {after}_number != 0.0;"
+    else:
+        yield f"const double {after} = {s.going.name} ? {value} : {name};"
 
 
 def _tested(

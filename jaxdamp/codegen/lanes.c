@@ -10,10 +10,12 @@
 #else
 #define VECTOR 4
 #endif
-/* Over all points of a block, in one or four vectors side by side. */
-#define GROUPS for (int base = 0; base < LANES; base += @vectors@ * VECTOR)
+/* Over all points of a block in groups of four vectors, which take turns or come one after the other. */
+#define GROUP (4 * VECTOR)
+#define GROUPS for (int base = 0; base < LANES; base += GROUP)
 #define PRAGMA(text) _Pragma(#text)
 #define IN_TURN(...) PRAGMA(omp simd __VA_ARGS__) for (int lanea = base; lanea < base + VECTOR; lanea++)
+#define ONE_BY_ONE(...) PRAGMA(omp simd __VA_ARGS__) for (int lanea = base; lanea < base + GROUP; lanea++)
 #define OTHERS const int laneb = lanea + VECTOR, lanec = laneb + VECTOR, laned = lanec + VECTOR
 #define ROW(name, count) double name[(count) ? (count) : 1][LANES] __attribute__((aligned(64)))
 

@@ -174,14 +174,9 @@ def test_what_is_not_finite_stays_in_its_lane_with_loops():
 
 @pytest.mark.parametrize("law", ["power", "rounded knees"])
 def test_laws_with_functions(law):
-    """Powers are exponentials of logarithms, in vectors."""
-    laws = {"power": PowerLaw(1800.0, 0.55, 900.0, 1.8), "rounded knees": PiecewiseLinear([-0.1], [9e2, 2e3], 0.01)}
-    with_its_loops(laws[law])
-
-
-def test_law_with_loops_in_vectors():
-    """Two searches a step; the knees of the law inside take no exponentials where they are sharp."""
-    with_its_loops(SeriesSpring(PiecewiseLinear([-0.1, 0.1], [900.0, 2e3, 800.0]), 1e6))
+    """Powers are exponentials of logarithms, in vectors; two searches in a step, which take exponentials."""
+    knees = PiecewiseLinear([-0.1], [9e2, 2e3], 0.01)
+    with_its_loops({"power": PowerLaw(1800.0, 0.55, 900.0, 1.8), "rounded knees": SeriesSpring(knees, 1e6)}[law])
 
 
 def test_the_kernel_compiled_as_c(monkeypatch):
