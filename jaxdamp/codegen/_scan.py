@@ -26,7 +26,8 @@ def printed_scan(step: Callable[[PyTree, PyTree], PyTree], carry: PyTree, rows: 
     rows are the same for all points. Only values pass, no derivatives.
 
     Arguments:
-        step: of numbers and small arrays in double precision; loops and branches inside it run on GPUs only.
+        step: of numbers and small arrays in double precision; in loops inside it points wait for each other, branches
+            run on GPUs only.
         carry: a tree of arrays.
         rows: a tree of arrays, one row for each step along the first axis.
 

@@ -196,10 +196,10 @@ class Exponential(AbstractFixedStep):
         printed: print the loop over time as C and let the machine's C compiler (gcc, clang) make vector code of it:
             for a `Ride` in a `sweep` or under `jax.vmap`, in double precision. The numbers are the same to rounding,
             and come 1 to 12 times as fast (`docs/speed.md`). On a GPU the loop is one CUDA kernel, 4 to 40 times as
-            fast as XLA there. Derivatives do not pass. What cannot be printed, such as laws with loops of their own on
-            a processor, is refused with the reason (`NotImplementedError`). If left out (None), a `sweep` prints what
-            can be printed, and if it takes more than a minute compares it with the loop of XLA; with False all is left
-            to XLA.
+            fast as XLA there. Derivatives do not pass. What cannot be printed, such as a step with branches on a
+            processor, is refused with the reason (`NotImplementedError`). If left out (None), a `sweep` prints what can
+            be printed, and if it takes more than a minute compares it with the loop of XLA; with False all is left to
+            XLA.
 
     >>> from jaxdamp import roads, simulate, vehicles
     >>> bump = roads.cosine_bump(0.05, start=0.1, duration=0.25)
