@@ -67,7 +67,8 @@ def verdict_of(result: "TuneResult[AbstractVehicle]") -> Verdict:
     cost = f"; price: {name} {price:+.1f} %" if name else "; nothing else gets worse"
     held = _limits_in_words(result)
     error = 0.0 if result.fresh is None else 100.0 * result.fresh.half_width(result.metric)
-    lost = [f"{name} is {100 * x:.1f} % beyond its limit" for name, x in lost_limits(result).items()]
+    over = lost_limits(result.fresh, result.allowed)
+    lost = [f"{name} is {100 * x:.1f} % beyond its limit" for name, x in over.items()]
     if lost:
         outcome, first, held = Outcome.LIMIT_LOST, f"Not better: {'; '.join(lost)}; {words}", ""
     elif gain - error > -NOTICED and (result.fresh is None or gain > 0.0):
@@ -144,11 +145,11 @@ def _limits_in_words(result: "TuneResult[AbstractVehicle]") -> str:
     return f"; limits: {'; '.join(texts)}" if texts else ""
 
 
-def lost_limits(result: "TuneResult[AbstractVehicle]") -> dict[str, float]:
+def lost_limits(fresh: "Rescore | None", allowed: Mapping[str, LimitRange]) -> dict[str, float]:
     """The mean excess over limits that are broken on average over fresh roads, by more than the error of this mean."""
-    if result.fresh is None or result.fresh.roads < 2:
+    if fresh is None or fresh.roads < 2:
         return {}
-    over = {name: excess(result.fresh, name, allowed) for name, allowed in result.allowed.items()}
+    over = {name: excess(fresh, name, limit) for name, limit in allowed.items()}
     return {name: float(np.mean(x)) for name, x in over.items() if np.mean(x) - half_interval(x) > WITHIN}
 
 
@@ -211,7 +212,7 @@ def bound_notes(space: SearchRange, changes: tuple[Change, ...]) -> list[str]:
 
 def early_end(ended: "Ended", max_steps: int) -> str:
     """Why a search that satisfied all limits did not converge."""
-    slope = f"the remaining slope is {ended.slope_left:.1e} of the metric per 100 % of the parameters"
+    slope = f"the remaining slope is {ended.slope_left():.1e} of the metric per 100 % of the parameters"
     if ended.out_of_steps:
         return f"The search stopped after {max_steps} steps, before an optimum: {slope}. Allow more with `max_steps`."
     return (
