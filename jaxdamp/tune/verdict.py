@@ -1,6 +1,7 @@
 """What came out of a tuning, in words: better or not, by how much, at what price, what holds it, and doubts."""
 
 import enum
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -189,6 +190,7 @@ def decided(fresh: "Rescore", allowed: Mapping[str, LimitRange]) -> bool:
 
 _ROUNDING = 1e-12  # of a metric, by which its derivative times the parameter counts as zero
 ALIKE = 1e-3  # relative difference of metrics at ends that count as one optimum
+MOST_NAMED = 2  # numbers at bounds that are named with their values; of more, the table of parameters has them
 
 
 def bound_notes(space: SearchRange, changes: tuple[Change, ...]) -> list[str]:
@@ -200,6 +202,10 @@ def bound_notes(space: SearchRange, changes: tuple[Change, ...]) -> list[str]:
     notes = []
     for origin, group in groups.items():
         ends = [f"{c.name} ended {c.note}, {c.after:.5g} {c.unit}".rstrip() for c in group]
+        if len(group) > MOST_NAMED:
+            counts = Counter(c.name.partition("[")[0] for c in group)
+            of = ", ".join(f"{count} of {path}" if count > 1 else path for path, count in counts.items())
+            ends = [f"{len(group)} parameters ended at their bounds: {of}"]
         widen = f"`bounds={{{group[0].name.partition('[')[0]!r}: (lower, upper)}}`"
         reason = {
             "default": f"by default 1/{FACTOR:g} of the start or {FACTOR:g} times it; other bounds: {widen}",
