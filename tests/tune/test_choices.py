@@ -52,6 +52,8 @@ def test_a_combination_without_a_number_comes_last() -> None:
     assert result.combinations is not None and float(get(result.vehicle, "damper.rate")) == 4400.0
     assert result.combinations.choices["damper.rate"].tolist() == [4400.0, 3000.0, 1500.0]
     assert result.combinations.met.tolist() == [True, True, False]
+    assert "is the best of 3 combinations, of which 1 without a number, beside" in result.summary
+    assert [row[-1] for row in result.combinations.table().rows] == ["met", "met", "no number"]
 
 
 def test_clicks_are_chosen_and_swept() -> None:
