@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from jaxdamp import Ride, dampers, parameters, roads, simulate, tune, vehicles
-from jaxdamp.solve import SequentialQuadratic
 from jaxdamp.tune.ranges import search_range
 from jaxdamp.tune.task import step_notes
 
@@ -32,22 +31,6 @@ def test_finds_the_closed_form_optimum_on_a_white_road(metric, best, start):
     assert float(parameters.get(result.vehicle, "damper.rate")) == pytest.approx(best, rel=1e-6)
     assert result.converged and not result.warnings
     assert result.after[metric] < result.before[metric]
-
-
-def test_a_search_that_ends_before_an_optimum_is_started_again(monkeypatch):
-    terminate, ended = SequentialQuadratic.terminate, []
-
-    def early(solver, state, promised):
-        if state.steps == 1 and not ended:
-            state.open = False
-            ended.append(state.y.copy())
-            return True
-        return terminate(solver, state, promised)
-
-    monkeypatch.setattr(SequentialQuadratic, "terminate", early)
-    result = tune.minimise("rms_sprung_acceleration", CAR, roads.white("C", speed=20.0))
-    assert result.parameters[0].after == pytest.approx(BEST_ACCELERATION, rel=1e-6) and result.converged
-    assert len(ended) == 1 and len(result.history) > 2
 
 
 def _closed_forms(car) -> dict[str, float]:

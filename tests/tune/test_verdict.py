@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import dampers, roads, tune
+from jaxdamp.solve import SequentialQuadratic
 from jaxdamp.tune import Outcome, Rescore, Status, TuneResult, minimising
 from jaxdamp.tune.limits import limit_ranges
 from jaxdamp.tune.ranges import Change
@@ -154,6 +155,22 @@ def test_an_optimum_at_a_kink_is_an_optimum():
     assert left == pytest.approx(right, rel=1e-6) and result.converged and not result.warnings
     stopped = tune.minimise(worse, car, WHITE, bounds=bounds, max_steps=2)
     assert stopped.status is Status.STEP_LIMIT
+
+
+def test_a_search_that_ends_before_an_optimum_is_started_again(monkeypatch):
+    terminate, ended = SequentialQuadratic.terminate, []
+
+    def early(solver, state, promised):
+        if state.steps == 1 and not ended:
+            state.open = False
+            ended.append(state.y.copy())
+            return True
+        return terminate(solver, state, promised)
+
+    monkeypatch.setattr(SequentialQuadratic, "terminate", early)
+    result = tune.minimise(COMFORT, CAR, WHITE)
+    assert result.parameters[0].after == pytest.approx(4656.4, abs=0.05) and result.converged
+    assert len(ended) == 1 and len(result.history) > 2
 
 
 def judged_beyond(monkeypatch, limit: float, excess: list[float]) -> list[range]:
