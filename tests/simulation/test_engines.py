@@ -120,7 +120,7 @@ class Seen:
 def test_the_road_and_its_rate_are_straight_over_the_steps_between_two_instants():
     ends = np.array([0.02, -0.3]), np.array([0.05, 0.7])
     begin, end = (RoadInput(*map(jnp.asarray, one)) for one in ends)
-    seen = _over(cast(Any, Seen()), cast(Any, jnp.zeros((4, 4))), begin, end, 4)
+    seen = cast(Any, _over)(Seen(), jnp.zeros((4, 4)), begin, end, 4)
     height, rate = np.linspace(*ends, 5).T
     np.testing.assert_allclose(seen, np.stack([height[:-1], height[1:], rate[:-1], rate[1:]], axis=1), rtol=1e-12)
 
