@@ -124,7 +124,7 @@ def one_at_a_time() -> AbstractContextManager[None]:
 def target() -> Target:
     """What the function that is being traced is compiled for; by default this process, see `_this_process`."""
     if is_printing():
-        vectors = is_printing_vectors()
+        vectors = is_printing_vectors()  # in which likely steps of searches are written out
         return _PRINTED._replace(library_powers=not vectors, fused_loops=vectors)
     return _OTHER_TARGET.value or _this_process()
 
