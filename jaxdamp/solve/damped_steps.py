@@ -19,7 +19,7 @@ EachLane: TypeAlias = Float[AnyArray, "*lanes"]
 LaneMask: TypeAlias = Bool[AnyArray, "*lanes"]
 Unknowns: TypeAlias = Float[AnyArray, "*lanes unknowns"]
 Triangles: TypeAlias = Float[AnyArray, "*lanes columns columns"]
-_Carry: TypeAlias = tuple[AnyArray, AnyArray, AnyArray, AnyArray | np.bool_]
+_Carry: TypeAlias = tuple[AnyArray, AnyArray, AnyArray, AnyArray | np.bool_, AnyArray | int]
 Flat = TypeVar("Flat", Array, np.ndarray)
 Tree = TypeVar("Tree")
 
@@ -32,8 +32,11 @@ LARGEST_STEP_SIZE = FIRST_DAMPING / LEAST_DAMPING
 MOST_OF_THE_WAY = 0.9  # to an edge, in one step
 NEAR = 1e-3  # coordinates so near an edge may go all the way
 AT_EDGE = 1e-6  # coordinates so near their lower bound end on it; also the distance to conditions
-FIRM = 1e6  # weight of a limit of several coordinates, relative to the data's
+FIRM = 1e4  # weight of a limit of several coordinates, relative to the data; its square times rounding errors is small
 ROUNDING = 500.0  # rounding errors of a sum of squares, in those of one number
+SLACK = 1e-9  # beyond a limit, that is a rounding error: a limit of one coordinate may stand twice
+TOGETHER = 5  # solutions of one step, after which one limit at a time is exchanged, which ends
+MOST_SOLUTIONS = 30  # after which no coordinate leaves its limit any more
 
 
 class Linearisation(NamedTuple):
@@ -237,8 +240,10 @@ def _damped_step(
 ) -> Unknowns:
     """Min ‖R d + q‖² + ‖D d‖² λ/step_size within limits of d and of C d; NaN where there is none.
 
-    A coordinate that would leave its limits is put on the nearer one, and the rest is solved again. Limits of C d
-    are rows of a great weight.
+    A coordinate that would leave its limits is put on the nearer one, one on a limit that the sum of squares pulls
+    inside is set free, and the rest is solved again (block pivoting). Limits of C d are rows of a great weight.
+
+    Source: L. F. Portugal, J. J. Júdice, L. N. Vicente, Mathematics of Computation 63, 1994.
     """
     n = state.scale.shape[-1]
     r, q, conditions = state.triangle[..., :n, :n], state.triangle[..., :n, n], state.conditions
@@ -248,6 +253,8 @@ def _damped_step(
     firm = FIRM * xp.maximum(xp.max(scale, axis=-1), 1.0)[..., None]
     low = xp.concatenate([xp.broadcast_to(lower, scale.shape), state.least], axis=-1)
     high = xp.concatenate([xp.broadcast_to(upper, scale.shape), xp.full_like(state.least, np.inf)], axis=-1)
+
+    slack = SLACK * xp.where(xp.isfinite(low), 1.0 + xp.abs(low), 1.0)
 
     def solved(held: AnyArray, at: AnyArray) -> AnyArray:
         coordinates, rows, values = held[..., :n], held[..., n:], xp.where(held[..., :n], at[..., :n], 0.0)
@@ -262,14 +269,24 @@ def _damped_step(
         reduced = xp.linalg.qr(xp.concatenate([matrix, target[..., None]], axis=-1), mode="r")
         return _back_substituted(xp, reduced[..., :n, :n], reduced[..., :n, n])
 
+    def pulled_inside(held: AnyArray, at: AnyArray, step: AnyArray) -> AnyArray:
+        beyond = xp.where(held[..., n:], _times(conditions, step) - at[..., n:], 0.0)
+        pull = (_times(r, step) + q)[..., None, :] @ r + (firm**2 * beyond)[..., None, :] @ conditions
+        pull = xp.concatenate([pull[..., 0, :] + damping**2 * step, -beyond], axis=-1)
+        return held & ((at == low) & (pull < 0) | (at == high) & (pull > 0))
+
     def body(carry: _Carry) -> _Carry:
-        held, at, _, _ = carry
+        held, at, _, _, solutions = carry
         step = solved(held, at)
         both = xp.concatenate([step, _times(conditions, step)], axis=-1)
-        outside = ~held & ((both < low) | (both > high))
-        return held | outside, xp.where(outside, xp.clip(both, low, high), at), step, xp.any(outside)
+        outside = ~held & ((both < low - slack) | (both > high + slack))
+        change = outside | pulled_inside(held, at, step)
+        last = change & (xp.cumsum(change[..., ::-1], axis=-1)[..., ::-1] == 1)
+        change = xp.where(solutions < TOGETHER, change, xp.where(solutions < MOST_SOLUTIONS, last, outside))
+        at = xp.where(outside, xp.clip(both, low, high), at)
+        return held ^ change, at, step, xp.any(change), solutions + 1
 
-    begin = (xp.zeros(low.shape, bool), xp.zeros(low.shape, low.dtype), xp.zeros_like(scale), xp.asarray(True))
+    begin = (xp.zeros(low.shape, bool), xp.zeros(low.shape, low.dtype), xp.zeros_like(scale), xp.asarray(True), 0)
     return xp.clip(_while(xp, lambda carry: carry[3], body, begin)[2], lower, upper)
 
 
