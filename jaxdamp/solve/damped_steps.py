@@ -35,6 +35,7 @@ AT_EDGE = 1e-6  # coordinates so near their lower bound end on it; also the dist
 FIRM = 1e4  # weight of a limit of several coordinates, relative to the data; its square times rounding errors is small
 ROUNDING = 500.0  # rounding errors of a sum of squares, in those of one number
 SLACK = 1e-9  # beyond a limit, that is a rounding error: a limit of one coordinate may stand twice
+ANEW = 0.1  # standard errors: a gain worth so much since the damping began is worth another beginning
 TOGETHER = 5  # solutions of one step, after which one limit at a time is exchanged, which ends
 MOST_SOLUTIONS = 30  # after which no coordinate leaves its limit any more
 
@@ -73,6 +74,7 @@ class State(NamedTuple):
     converged: LaneMask  # whether the search has ended by its tolerance
     stuck: LaneMask  # whether there is no further step
     idle: Int[AnyArray, "*lanes"]  # points tried in a row without a decrease that counts
+    since: EachLane  # half the sum of squares where the damping began, first or anew
     aux: PyTree  # what the residual gives beside its value at the accepted point
 
 
@@ -124,19 +126,24 @@ def judged(xp: ModuleType, rules: Rules, state: State, here: Linearisation, aux:
     room = here.margins / length - AT_EDGE
     changed = {
         "triangle": tried,
-        "scale": xp.maximum(state.scale, xp.sqrt(xp.sum(tried[..., :-1] ** 2, axis=-2))),
+        "scale": xp.maximum(state.scale, _norms(xp, tried)),
         "conditions": here.margin_slopes / length[..., None],
         "least": -xp.where(room > NEAR, MOST_OF_THE_WAY * room, room),
         "aux": aux,
     }
     chosen = {name: where(xp, accepted, value, getattr(state, name)) for name, value in changed.items()}
     step_size = xp.where(first, state.step_size, state.step_size / divisor)
-    converged = ~first & (negligible | state.short)
+    now = _half_squares(chosen["triangle"])
+    anew = ~first & state.short & ~negligible & (state.since - now >= ANEW**2 / here.samples * now)
+    anew = anew & (rules.patience is None)
+    step_size, since = xp.where(anew, 1.0, step_size), xp.where(first | anew, now, state.since)
+    chosen["scale"] = xp.where(anew[..., None], _norms(xp, chosen["triangle"]), chosen["scale"])
+    converged = ~first & (negligible | state.short) & ~anew
     gained = first | (accepted & (old - new >= state.floor))
     idle = xp.where(gained, 0, state.idle + 1)
     if rules.patience is not None:
         converged = converged | (idle >= rules.patience) | (state.whole & ~gained)
-    counts = {"steps": state.steps + 1, "idle": idle}
+    counts = {"steps": state.steps + 1, "idle": idle, "since": since}
     return accepted, state._replace(step_size=step_size, converged=converged, **counts, **chosen)
 
 
@@ -213,6 +220,11 @@ def _triangle(xp: ModuleType, rows: Float[AnyArray, "*lanes rows columns"]) -> T
     missing = max(rows.shape[-1] - rows.shape[-2], 0)
     rows = xp.concatenate([rows, xp.zeros((*rows.shape[:-2], missing, rows.shape[-1]), rows.dtype)], axis=-2)
     return xp.linalg.qr(rows, mode="r")
+
+
+def _norms(xp: ModuleType, triangle: Triangles) -> Unknowns:
+    """Of the columns of the Jacobian."""
+    return xp.sqrt(xp.sum(triangle[..., :-1] ** 2, axis=-2))
 
 
 def _half_squares(triangle: Triangles) -> EachLane:

@@ -124,6 +124,7 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
             converged=no,
             stuck=no,
             idle=xp.zeros(lanes, int),
+            since=zeros,
             aux=aux,
         )
 
