@@ -35,7 +35,9 @@ AT_EDGE = 1e-6  # coordinates so near their lower bound end on it; also the dist
 FIRM = 1e4  # weight of a limit of several coordinates, relative to the data; its square times rounding errors is small
 ROUNDING = 500.0  # rounding errors of a sum of squares, in those of one number
 SLACK = 1e-9  # beyond a limit, that is a rounding error: a limit of one coordinate may stand twice
-ANEW = 0.1  # standard errors: a gain worth so much since the damping began is worth another beginning
+WORTH = 0.1  # standard errors: a decrease that counts, where the damping begins anew
+PATIENCE = 30  # points tried without one
+KINK = 0.01  # standard errors: a refused step that is predicted to gain less will only become shorter
 TOGETHER = 5  # solutions of one step, after which one limit at a time is exchanged, which ends
 MOST_SOLUTIONS = 30  # after which no coordinate leaves its limit any more
 
@@ -73,8 +75,9 @@ class State(NamedTuple):
     steps: Int[AnyArray, "*lanes"]  # points tried
     converged: LaneMask  # whether the search has ended by its tolerance
     stuck: LaneMask  # whether there is no further step
-    idle: Int[AnyArray, "*lanes"]  # points tried in a row without a decrease that counts
-    since: EachLane  # half the sum of squares where the damping began, first or anew
+    since: EachLane  # half the sum of squares at the last decrease that counts
+    idle: Int[AnyArray, "*lanes"]  # points tried since
+    improved: LaneMask  # whether there was one since the damping began, first or anew
     aux: PyTree  # what the residual gives beside its value at the accepted point
 
 
@@ -133,18 +136,27 @@ def judged(xp: ModuleType, rules: Rules, state: State, here: Linearisation, aux:
     }
     chosen = {name: where(xp, accepted, value, getattr(state, name)) for name, value in changed.items()}
     step_size = xp.where(first, state.step_size, state.step_size / divisor)
-    now = _half_squares(chosen["triangle"])
-    anew = ~first & state.short & ~negligible & (state.since - now >= ANEW**2 / here.samples * now)
-    anew = anew & (rules.patience is None)
-    step_size, since = xp.where(anew, 1.0, step_size), xp.where(first | anew, now, state.since)
+    now, patience = _half_squares(chosen["triangle"]), rules.patience
+    worth = state.floor if patience is not None else xp.maximum(state.floor, WORTH**2 / here.samples * now)
+    gained = state.since - now >= worth
+    idle, improved = xp.where(first | gained, 0, state.idle + 1), ~first & (state.improved | gained)
+    blocked = state.short | ~accepted & (state.predicted < KINK**2 / here.samples * now)
+    if patience is not None:
+        ends = state.short | (idle >= patience) | (state.whole & ~gained)
+        anew = xp.zeros_like(ends)
+    else:
+        ends = blocked | (idle >= PATIENCE)
+        anew = ~first & ~negligible & ends & improved
     chosen["scale"] = xp.where(anew[..., None], _norms(xp, chosen["triangle"]), chosen["scale"])
-    converged = ~first & (negligible | state.short) & ~anew
-    gained = first | (accepted & (old - new >= state.floor))
-    idle = xp.where(gained, 0, state.idle + 1)
-    if rules.patience is not None:
-        converged = converged | (idle >= rules.patience) | (state.whole & ~gained)
-    counts = {"steps": state.steps + 1, "idle": idle, "since": since}
-    return accepted, state._replace(step_size=step_size, converged=converged, **counts, **chosen)
+    changes = {
+        "step_size": xp.where(anew, 1.0, step_size),
+        "converged": ~first & (negligible | ends) & ~anew,
+        "steps": state.steps + 1,
+        "since": xp.where(first | gained, now, state.since),
+        "idle": xp.where(anew, 0, idle),
+        "improved": improved & ~anew,
+    }
+    return accepted, state._replace(**changes, **chosen)
 
 
 def with_proposal(

@@ -123,8 +123,9 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
             steps=xp.zeros(lanes, int),
             converged=no,
             stuck=no,
-            idle=xp.zeros(lanes, int),
             since=zeros,
+            idle=xp.zeros(lanes, int),
+            improved=no,
             aux=aux,
         )
 
