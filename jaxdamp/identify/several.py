@@ -81,6 +81,9 @@ def search_from(problem: Problem, *, starts: int | None, max_steps: int, solver:
             key=lambda end: (1.0 + BETTER * (end is not before)) * end.squares,
             default=before,
         )
+        if best is not before:
+            whole = _to_its_end(problem, best, max_steps, solver)
+            ends, best = [whole if end is best else end for end in ends], whole
         if before.finite and best.squares >= (1.0 - WORTH_A_ROUND) * before.squares:
             break
         problem = problem.started_at(best.values)
@@ -131,10 +134,17 @@ def _follow(
     promising = sorted(open_ended, key=lambda end: end.squares)
     ends = [end for end in looks if end.converged]
     for look in promising[:FOLLOWED]:
-        left = min(max_steps - look.steps, FOLLOWED_STEPS)
-        on = search(problem.started_at(look.values), left, solver=solver) if left else look._replace(steps=0)
-        ends.append(on._replace(steps=look.steps + on.steps))
+        ends.append(_to_its_end(problem, look, min(max_steps, look.steps + FOLLOWED_STEPS), solver))
     return ends
+
+
+def _to_its_end(problem: Problem, end: SearchEnd, max_steps: int, solver: Solver | None) -> SearchEnd:
+    """The end of a search that was followed for fewer steps than it may take."""
+    left = max_steps - end.steps
+    if end.converged or left < 1:
+        return end
+    on = search(problem.started_at(end.values), left, solver=solver)
+    return on._replace(steps=end.steps + on.steps)
 
 
 def minima_of(solution: Solution, names: Sequence[str], variance: float) -> tuple[Minimum, ...]:

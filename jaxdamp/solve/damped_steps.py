@@ -294,6 +294,8 @@ def _damped_step(
         return _back_substituted(xp, reduced[..., :n, :n], reduced[..., :n, n])
 
     def pulled_inside(held: AnyArray, at: AnyArray, step: AnyArray) -> AnyArray:
+        if xp is np and not np.any(held):
+            return held
         beyond = xp.where(held[..., n:], _times(conditions, step) - at[..., n:], 0.0)
         pull = (_times(r, step) + q)[..., None, :] @ r + (firm**2 * beyond)[..., None, :] @ conditions
         pull = xp.concatenate([pull[..., 0, :] + damping**2 * step, -beyond], axis=-1)
