@@ -299,7 +299,7 @@ def _damped_step(
         beyond = xp.where(held[..., n:], _times(conditions, step) - at[..., n:], 0.0)
         pull = (_times(r, step) + q)[..., None, :] @ r + (firm**2 * beyond)[..., None, :] @ conditions
         pull = xp.concatenate([pull[..., 0, :] + damping**2 * step, -beyond], axis=-1)
-        return held & ((at == low) & (pull < 0) | (at == high) & (pull > 0))
+        return held & (low < high) & ((at == low) & (pull < 0) | (at == high) & (pull > 0))
 
     def body(carry: _Carry) -> _Carry:
         held, at, _, _, solutions = carry
