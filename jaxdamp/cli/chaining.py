@@ -1,6 +1,6 @@
 """The whole chain: `jaxdamp report` with records, and `jaxdamp demo` on a damper whose truth is known."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -17,10 +17,11 @@ from jaxdamp.cli.records import Reading, decisions, grouped, law_names
 from jaxdamp.cli.riding import Driving, show_ride, unusual
 from jaxdamp.cli.tuning import exit_code_of, tuned, tuning_arguments, write_tuning
 from jaxdamp.cli.vehicle_words import parse_vehicle
+from jaxdamp.cli.wording import message
 from jaxdamp.dampers import AbstractDamper, Besinger, SeriesSpring, not_identified
-from jaxdamp.identify import FitResult
+from jaxdamp.identify import Comparison, FitResult
 from jaxdamp.parameters import parameters
-from jaxdamp.report import Attempts, Report, chain_report, records_table, ride_tables
+from jaxdamp.report import Attempts, FitPart, Report, chain_report, records_table, ride_tables
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import Response
 from jaxdamp.tune import Run, TuneResult
@@ -75,6 +76,8 @@ def report(
         with work.saving("Laws and tables", "the rides, the tuning and the report") as draft:
             write_fits(draft, fits.comparison, runs, work.attempts)
             write_tables(draft / "tables", {"preflight": preflight.table()})
+        part = FitPart(fits.comparison, tuple(runs), preflight=preflight, remarks=remarks)
+        laws = part.begun(Attempts(message=message))
         best = fits.comparison.best.result
         fitted = make(best.law)
         result, cars = None, {"vehicle as it is": car, "fitted law": fitted}
@@ -87,7 +90,6 @@ def report(
             screen.points(sentences)
             result = tuned(screen, call)
             cars["tuned law"] = result.vehicle
-        remarks += sentences
         rides = driven(screen, cars, surface, run, "Driving")
         tables = show_ride(screen, rides)
         with work.saving("Tuned law, vehicle and tables") as draft:
@@ -95,8 +97,8 @@ def report(
                 write_tuning(draft, result)
             write_tables(draft, {f"ride_{name}": table for name, table in tables.items()})
         title = f"{vehicle} on {road} at {display().speed(driving.speed)}"
-        words = {"title": f"Bench records to a better damper: {title}", "remarks": remarks, "runs": tuple(runs)}
-        work.page(chain_report, fits.comparison, {title: rides}, result, preflight=preflight, **words)
+        words = {"title": f"Bench records to a better damper: {title}", "sentences": sentences}
+        work.page(chain_report, fits.comparison, {title: rides}, result, laws=laws, **words)
     exit_code_of(result)
 
 
@@ -180,6 +182,9 @@ def run_demo(screen: Screen, scenario: Scenario, output: Output) -> None:
         with work.saving("Laws and tables", f"the rides, the tuning, {fits.missing}") as draft:
             write_fits(draft, fits.comparison, runs, work.attempts)
             _write_truth(draft, truth, scenario, work.attempts)
+        found, remarks = bench.preflight(runs), _remarks(scenario, fits)
+        part = FitPart(fits.comparison, tuple(runs), sheets=False, preflight=found, remarks=remarks)
+        laws = part.begun(Attempts(message=message))
         rides = _rides(screen, scenario, fits)
         result = None if truth is None else _tuned(screen, truth, scenario)
         if truth is not None:
@@ -191,7 +196,7 @@ def run_demo(screen: Screen, scenario: Scenario, output: Output) -> None:
                 write_tables(draft / "tables", tables)
             if result is not None:
                 write_tuning(draft, result)
-        work.page(_page, scenario, runs, fits, truth, rides, result)
+        work.page(_page, scenario, laws, fits.comparison, truth, rides, result)
         target = work.results.target
     screen.details(screen.times_table())
     screen.say(f"Open {target / 'report.html'}. The records are files like those of a real bench; fit them yourself:")
@@ -200,8 +205,8 @@ def run_demo(screen: Screen, scenario: Scenario, output: Output) -> None:
 
 def _page(
     scenario: Scenario,
-    runs: BenchSet,
-    fits: Fitted,
+    laws: Callable[[], Report],
+    comparison: Comparison,
     truth: FitResult | None,
     rides: Mapping[str, Mapping[str, Response]],
     tuning: TuneResult | None,
@@ -210,22 +215,14 @@ def _page(
     attempts: Attempts,
 ) -> Report:
     """The page of the chain, with the truth."""
-    noise = f"sensor noise of {scenario.force_noise:g} N and {1e6 * scenario.stroke_noise:g} µm"
     page = chain_report(
-        fits.comparison,
+        comparison,
         rides,
         tuning,
         title="jaxdamp demo: from bench records to a better damper",
         sentences=[truth_verdict(scenario, truth)],
         sheets=False,
-        preflight=bench.preflight(runs),
-        runs=tuple(runs),
-        remarks=[
-            f"A virtual bench recorded a known damper under {len(scenario.tests)} sines, with {noise}. "
-            f"The records {scenario.held_out} were held out of all fits.",
-            f"The true damper: {scenario.law!r}",
-            *fits.failures,
-        ],
+        laws=laws,
         folder=folder,
         attempts=attempts,
     )
@@ -233,6 +230,17 @@ def _page(
         page.heading("Was the truth found?")
         page.table(truth_table(scenario, truth))
     return page
+
+
+def _remarks(scenario: Scenario, fits: Fitted) -> list[str]:
+    """On the records of the demo."""
+    noise = f"sensor noise of {scenario.force_noise:g} N and {1e6 * scenario.stroke_noise:g} µm"
+    return [
+        f"A virtual bench recorded a known damper under {len(scenario.tests)} sines, with {noise}. "
+        f"The records {scenario.held_out} were held out of all fits.",
+        f"The true damper: {scenario.law!r}",
+        *fits.failures,
+    ]
 
 
 def record(screen: Screen, scenario: Scenario, folder: Path) -> BenchSet:

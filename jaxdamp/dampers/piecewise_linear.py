@@ -36,7 +36,8 @@ class PiecewiseLinear(AbstractMemoryless):
     """F(v) continuous with slope sₖ between the knots vₖ, and F(0) = 0.
 
     F = s₀ v + Σ (sₖ − sₖ₋₁) max(v − vₖ, 0) − const. With `monotone` (the default) all slopes are positive, so the law
-    is passive and can be inverted. A knee width w rounds the knots: max(u, 0) becomes w ln(1 + exp(u/w)).
+    is passive and can be inverted. A knee width w rounds the knots: max(u, 0) becomes w ln(1 + exp(u/w)). By default a
+    tuning moves the slopes between the knots, and the knots only where they are named.
 
     Arguments:
         knots: velocities [m/s] where the slope changes, strictly increasing, shape (k,).
@@ -49,7 +50,7 @@ class PiecewiseLinear(AbstractMemoryless):
     [0.0, 200.0, 280.0, -250.0]
     """
 
-    knots: Vector = parameter("m/s", "velocities where the slope changes", increasing)
+    knots: Vector = parameter("m/s", "velocities where the slope changes", increasing, adjustable=False)
     slopes: Vector = parameter(
         "N s/m", "slopes between the knots", lambda law: positive if law.monotone else real, linear=True
     )

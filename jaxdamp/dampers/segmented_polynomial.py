@@ -43,8 +43,8 @@ class SegmentedPolynomial(AbstractMemoryless):
         velocity_range: lowest and highest velocity [m/s] where the law is valid.
     """
 
-    compression_knots: Vector = parameter("m/s", "velocities v₁ < v₂ < 0", increasing_negative)
-    rebound_knot: Number = parameter("m/s", "velocity v₄ > 0", positive)
+    compression_knots: Vector = parameter("m/s", "velocities v₁ < v₂ < 0", increasing_negative, adjustable=False)
+    rebound_knot: Number = parameter("m/s", "velocity v₄ > 0", positive, adjustable=False)
     shares_low_compression: Vector = parameter("N", "shares by power on v₂ < v ≤ 0", linear=True)
     shares_mid_compression: Vector = parameter("N", "shares by power on v₁ < v ≤ v₂", linear=True)
     shares_high_compression: Vector = parameter("N", "shares by power on v ≤ v₁", linear=True)

@@ -22,7 +22,7 @@ from jaxdamp.report.benches import (
     records_table as records_table,
     table_report as table_report,
 )
-from jaxdamp.report.chains import chain_report, result_report
+from jaxdamp.report.chains import FitPart as FitPart, chain_report, result_report
 from jaxdamp.report.fits import (
     add_fits as add_fits,
     add_other_fits as add_other_fits,

@@ -1,10 +1,14 @@
 """A page on the whole chain, and on any result: records, laws, rides on the best law, a tuning."""
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from jaxdamp import plots
+from jaxdamp._display import Display, display, shown_in
 from jaxdamp._results import AbstractResult
+from jaxdamp._second_process import elsewhere
 from jaxdamp.bench import BenchRun, Evaluation, Preflight
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Comparison, VehicleComparison, VehicleFit
@@ -31,6 +35,7 @@ def chain_report(
     runs: Sequence[BenchRun] | None = None,
     remarks: Sequence[str] = (),
     baseline: AbstractDamper | None = None,
+    laws: Callable[[], Report] | None = None,
     folder: Path | None = None,
     attempts: Attempts | None = None,
 ) -> Report:
@@ -48,6 +53,7 @@ def chain_report(
         runs: the records in the order of the page; the fitted ones and those held out, if left out.
         remarks: on the records.
         baseline: another law, drawn over the curves and scored on the same records.
+        laws: its part on records and laws, drawn by `FitPart.begun` with the same arguments; drawn now if left out.
         folder: folder for the pictures as separate files; without it they are only in the page.
         attempts: collects parts that fail; a new one if left out.
 
@@ -75,13 +81,10 @@ def chain_report(
             *(bench_verdict(evaluation, preflight) if evaluation else []),
         ],
     )
+    part = FitPart(comparison, runs, sheets, evaluation, preflight, remarks, baseline)
+    report.include(part.drawn(report.attempts) if laws is None else laws())
     if sheets:
-        _add_sheets(report, comparison, rides, tuned, baseline)
-    records = (*comparison.best.result.runs, *comparison.held_out) if runs is None else tuple(runs)
-    add_records(report, records, comparison.held_out, remarks, preflight)
-    if evaluation is not None:
-        add_evaluation(report, evaluation)
-    add_fits(report, comparison, baseline=baseline, others=False)
+        _add_ride_sheet(report, rides, tuned)
     for number, (road, ride) in enumerate(rides.items(), 1):
         report.heading(f"Ride: {road}")
         report.points(notes_of(ride))
@@ -93,15 +96,55 @@ def chain_report(
     return report
 
 
-def _add_sheets(
-    report: Report,
-    comparison: Comparison,
-    rides: Mapping[str, Mapping[str, Response]],
-    tuned: TuneResult | None,
-    baseline: AbstractDamper | None,
-) -> None:
-    """The damper, and its tuning or its first ride, each on one page."""
-    report.sheet(lambda: comparison.plot("sheet", baseline=baseline), comparison.verdict[0], "damper_sheet")
+class FitPart(NamedTuple):
+    """What `chain_report` says of records and laws.
+
+    Arguments:
+        comparison: the fits, of `identify.compare`.
+        runs, sheets, evaluation, preflight, remarks, baseline: as in `chain_report`.
+    """
+
+    comparison: Comparison
+    runs: Sequence[BenchRun] | None = None
+    sheets: bool = True
+    evaluation: Evaluation | None = None
+    preflight: Preflight | None = None
+    remarks: Sequence[str] = ()
+    baseline: AbstractDamper | None = None
+
+    def drawn(self, attempts: Attempts | None = None) -> Report:
+        """Its sheet and sections.
+
+        Arguments:
+            attempts: collects parts that fail.
+        """
+        part, comparison, baseline = Report("", {}, attempts), self.comparison, self.baseline
+        if self.sheets:
+            part.sheet(lambda: comparison.plot("sheet", baseline=baseline), comparison.verdict[0], "damper_sheet")
+        records = (*comparison.best.result.runs, *comparison.held_out) if self.runs is None else tuple(self.runs)
+        add_records(part, records, comparison.held_out, self.remarks, self.preflight)
+        if self.evaluation is not None:
+            add_evaluation(part, self.evaluation)
+        add_fits(part, comparison, baseline=baseline, others=False)
+        return part
+
+    def begun(self, attempts: Attempts | None = None) -> Callable[[], Report]:
+        """The same, drawn by another process from now on; where there is none, when it is asked for.
+
+        Arguments:
+            attempts: as in `drawn`, one that can be pickled.
+        """
+        compute = functools.partial(_shown, display(), self, attempts)
+        return elsewhere(compute) or compute
+
+
+def _shown(shown: Display, part: FitPart, attempts: Attempts | None) -> Report:
+    with shown_in(shown):
+        return part.drawn(attempts)
+
+
+def _add_ride_sheet(report: Report, rides: Mapping[str, Mapping[str, Response]], tuned: TuneResult | None) -> None:
+    """The tuning or the first ride on one page."""
     if tuned is not None:
         report.sheet(lambda: tuned.plot("sheet"), tuned.verdict.sentence, "ride_sheet")
     elif rides:

@@ -30,7 +30,7 @@ class Attempts:
         troubles: the parts that failed, completely or partly, and why, in words.
     """
 
-    def __init__(self, check: Callable[[], None] = lambda: None, message: Callable[[Exception], str] = str) -> None:
+    def __init__(self, check: Callable[[], object] = bool, message: Callable[[Exception], str] = str) -> None:
         self.troubles: list[str] = []
         self._check, self._message = check, message
 
@@ -136,11 +136,14 @@ class Report:
 
     Arguments:
         title: of the page.
-        folder: folder for the pictures as separate PNG files; without it they are only in the page.
+        folder: folder for the pictures as separate PNG files, or a dictionary that takes their contents by name;
+            without it they are only in the page.
         attempts: collects parts that fail, such as a picture; they are listed at the end of the page.
     """
 
-    def __init__(self, title: str, folder: Path | None = None, attempts: Attempts | None = None) -> None:
+    def __init__(
+        self, title: str, folder: Path | dict[str, bytes] | None = None, attempts: Attempts | None = None
+    ) -> None:
         self.title = said(title)
         self.attempts = Attempts() if attempts is None else attempts
         self._folder = folder
@@ -167,6 +170,36 @@ class Report:
             image = self._image(figure(), finding, f"{name}.png", pdf)
             also = f'<figcaption>To print or to send: <a href="{pdf}">{pdf}</a></figcaption>' if pdf else ""
             self._sheets.append(_Block(what, lambda: f'<figure class="sheet">{image()}{also}</figure>'))
+
+    def include(self, part: "Report") -> None:
+        """Sheets and sections of another page, with its files and what failed there, at the end of this one's.
+
+        Arguments:
+            part: with a dictionary as its folder if this page has a folder.
+        """
+        part._settle()
+        for name, content in part._folder.items() if isinstance(part._folder, dict) else ():
+            self._write(name, content)
+        self._sheets += part._sheets
+        self._headings += part._headings
+        self._sections += part._sections
+        if part.attempts is not self.attempts:
+            self.attempts.troubles += part.attempts.troubles
+
+    def _write(self, name: str, content: bytes) -> None:
+        if isinstance(self._folder, dict):
+            self._folder[name] = content
+        elif self._folder is not None:
+            (self._folder / name).write_bytes(content)
+
+    def __getstate__(self) -> dict[str, object]:
+        """All of it with its pictures drawn, for another process."""
+        self._settle()
+        return vars(self)
+
+    def _settle(self) -> None:
+        for blocks in (self._sheets, self._blocks, *self._sections):
+            blocks[:] = map(self._settled, blocks)
 
     def _add(self, block: "str | _Block") -> None:
         (self._sections[-1] if self._sections else self._blocks).append(block)
@@ -231,10 +264,9 @@ class Report:
         def image(picture: Drawn) -> str:
             for text in picture.warnings:
                 warnings.warn(text, UserWarning, stacklevel=2)
-            if self._folder is not None:
-                (self._folder / name).write_bytes(picture.png)
-                if pdf:
-                    (self._folder / pdf).write_bytes(picture.pdf)
+            self._write(name, picture.png)
+            if pdf:
+                self._write(pdf, picture.pdf)
             source = f"data:image/png;base64,{base64.b64encode(picture.png).decode('ascii')}"
             return f'<img alt="{html.escape(picture.finding or words)}" width="{width}" src="{source}">'
 
@@ -249,8 +281,7 @@ class Report:
         Arguments:
             command: the command that writes this page, for its last lines, which have date and versions.
         """
-        for blocks in (self._sheets, self._blocks, *self._sections):
-            blocks[:] = map(self._settled, blocks)
+        self._settle()
         links = [f'<a href="#part-{n}">{html.escape(text)}</a>' for n, text in enumerate(self._headings, 1)]
         contents = [f"<nav>{' · '.join(links)}</nav>"] * (len(links) > 1)
         troubles = [_points(list(map(display().words, self.attempts.troubles)))] if self.attempts.troubles else []

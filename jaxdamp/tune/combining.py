@@ -36,7 +36,7 @@ class Driven:
             evaluations = evaluator.at(part / self.task.space.unit)
             least = min(least, *(float(one.rows[0]) for one in evaluations))
             pairs = zip(part, evaluations, strict=True)
-            self.ends += [Ended(point, one, (), out_of_steps=False, slope_left=0.0) for point, one in pairs]
+            self.ends += [Ended(point, one, (), out_of_steps=False, slope_left=lambda: 0.0) for point, one in pairs]
             progress(len(self.ends), least)
 
     def search(self, starts: object, evaluations: object, limits: Sequence[Limit]) -> list[Ended]:

@@ -1,5 +1,6 @@
 """The descent of `minimise`: searches from one or several starts, and how far from an optimum they ended."""
 
+import functools
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, final
@@ -23,7 +24,7 @@ class Ended(NamedTuple):
     evaluation: Evaluation  # numbers and derivatives there
     history: tuple[float, ...]  # the metric after each step
     out_of_steps: bool  # whether it had used all its steps
-    slope_left: float  # length of the projected scaled gradient, relative to the metric
+    slope_left: Callable[[], float]  # length of the projected scaled gradient, relative to the metric
 
 
 @final
@@ -106,12 +107,17 @@ class Descent:
         return not left < self.task.tolerance.slope and state.steps < self._max_steps
 
     def _ended(self, state: SearchState, history: tuple[float, ...], scaling: Scaling) -> Ended:
-        space, tolerance = self.task.space, self.task.tolerance
+        space, out_of_steps = self.task.space, state.steps >= self._max_steps
+
+        @functools.cache  # many gradients where it is a kink, and only of ends that are judged
+        def slope_left() -> float:
+            left = _slope_left(self._evaluator, state, scaling)
+            if left < self.task.tolerance.slope or out_of_steps:
+                return left
+            return min(left, _slope_left_at_kink(self._evaluator, state, scaling))
+
         values = np.clip(state.y * space.unit, space.lower, space.upper)
-        left, out_of_steps = _slope_left(self._evaluator, state, scaling), state.steps >= self._max_steps
-        if left >= tolerance.slope and not out_of_steps:
-            left = min(left, _slope_left_at_kink(self._evaluator, state, scaling))
-        return Ended(values, state.evaluation, history, out_of_steps, left)
+        return Ended(values, state.evaluation, history, out_of_steps, slope_left)
 
 
 def reached(limits: Sequence[Limit], values: Mapping[str, float], tolerance: Tolerance) -> list[Limit]:

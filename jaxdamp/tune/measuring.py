@@ -1,6 +1,8 @@
 """What a tuning computes of a vehicle: metrics on one road or over scenarios, in one compiled program."""
 
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple, final
 
 import equinox as eqx
@@ -157,6 +159,7 @@ class BatchProgram:
 
     def __init__(self, measured: Measurement, free: FreeParameters, lanes: int) -> None:
         self.lanes, self.free, self.points = min(lanes, LANES), free, 0
+        self._compiled = False
         self.measured = measured if lanes == 1 else measured.by(measured.ride.side_by_side())
         self.differentiated = tuple(dict.fromkeys([*measured.objective.names, *measured.limited_names]))
         modes, few = measured.ride.derivatives, free.values.size <= FORWARD * len(self.differentiated)
@@ -172,14 +175,28 @@ class BatchProgram:
     def at(self, designs: Float[np.ndarray, "points free"], ride: Ride | ScenarioRide | None = None) -> Computed:
         """All numbers of designs, and derivatives by the physical values; by another ride if one is given."""
         self.points += len(designs)
-        measured, values, slopes = self.measured, [], []
+        measured = self.measured
         if ride is not None:
             measured = measured.by(ride if self.lanes == 1 else ride.side_by_side())
-        for part in self._in_lanes(designs):
-            numbers, derivatives = _values_and_slopes(measured, self.free, part, self.differentiated, self._mode)
-            values.append(np.atleast_2d(np.asarray(numbers, np.float64)))
-            slopes.append(np.asarray(derivatives, np.float64).reshape(-1, *derivatives.shape[-2:]))
+
+        def computed(part: Array) -> Computed:
+            values, slopes = _values_and_slopes(measured, self.free, part, self.differentiated, self._mode)
+            return Computed(
+                np.atleast_2d(np.asarray(values, np.float64)),
+                np.asarray(slopes, np.float64).reshape(-1, *slopes.shape[-2:]),
+            )
+
+        values, slopes = zip(*self._by_cores(computed, self._in_lanes(designs)), strict=True)
         return Computed(np.concatenate(values)[: len(designs)], np.concatenate(slopes)[: len(designs)])
+
+    def _by_cores(self, compute: Callable[[Array], Computed], parts: Sequence[Array]) -> list[Computed]:
+        """One part on each core, once the program is compiled: a car's loop takes one of them."""
+        first, self._compiled = [] if self._compiled else [compute(parts[0])], True
+        others = parts[len(first) :]
+        if len(others) < 2:
+            return [*first, *map(compute, others)]
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            return [*first, *pool.map(compute, others)]
 
     def _in_lanes(self, designs: Float[np.ndarray, "points free"]) -> list[Array]:
         """Designs in groups, the last one filled up; each alone where there is one lane."""

@@ -24,7 +24,7 @@ from jaxdamp.tune.rescoring import Rescore, driver, on_fresh_roads
 from jaxdamp.tune.result import Attempt, Drive, ScenarioValues, TuneResult, V
 from jaxdamp.tune.scenario_ride import ScenarioRide, exact
 from jaxdamp.tune.scenarios import Road, Scenarios
-from jaxdamp.tune.settings import DEFAULTS, Settings, completed
+from jaxdamp.tune.settings import DEFAULTS, Asked, Settings, completed
 from jaxdamp.tune.task import DesignTask, Evaluator, check_call, is_white
 from jaxdamp.tune.verdict import (
     active_words,
@@ -115,7 +115,7 @@ def minimise(
     check_objective("metric", metric, "The call is `minimise(metric, vehicle, road)`.")
     check_call("minimise(metric, vehicle, road)", vehicle, road, asked)
     task = DesignTask([metric], vehicle, road, argument="metric", settings=asked)
-    max_steps, fresh_roads, name = asked["max_steps"], asked["fresh_roads"], task.objective.name
+    fresh_roads, name = asked["fresh_roads"], task.objective.name
     evaluator = Evaluator(task, asked["starts"])
     starts = start_points(task.space, asked["starts"], asked["seed"]) / task.space.unit
     evaluations, limits = evaluator.begin(starts)
@@ -123,21 +123,22 @@ def minimise(
         progress = progress or (lambda step, value: shown(f"step {step}, {name} {value:.5g}"))
         combining = every_combination(evaluator, progress)
         task.refuse_constant(evaluations[0], [one.evaluation for one in combining.ends] if combining else ())
-        descent = combining or Descent(evaluator, max_steps, progress)
+        descent = combining or Descent(evaluator, asked["max_steps"], progress)
         several = descent.search(starts, evaluations, limits)
-        ended = _best(descent, several, limits)
-        attempts = _attempts(task, starts, several, limits) if len(several) > 1 else ()
-        result = _result(evaluator, evaluations[0], ended, attempts, (limits, limits), max_steps, fresh_roads)
-        tighter = limits
+        ended, tighter = _best(descent, several, limits), limits
+        fresh = _on_fresh_roads(evaluator, (task.space.start, ended.values), range(fresh_roads), task.allowed)
         for again in range(1, TIGHTENED + 1):
-            excess = {} if result.violated else lost_limits(result)
+            met = not missed(limits, task.numbers(ended.evaluation.values), task.tolerance)
+            excess = lost_limits(fresh, task.allowed) if met else {}
             if not excess:
                 break
             tighter = [limit.tightened(excess.get(limit.of, 0.0)) for limit in tighter]
             again_from = descent.search([ended.values / task.space.unit], [ended.evaluation], tighter)
             ended = _best(descent, again_from, tighter)
-            both = limits, tighter
-            result = _result(evaluator, evaluations[0], ended, attempts, both, max_steps, fresh_roads, again)
+            others = range(again * fresh_roads, (again + 1) * fresh_roads)
+            fresh = _on_fresh_roads(evaluator, (task.space.start, ended.values), others, task.allowed)
+        attempts = _attempts(task, starts, several, limits) if len(several) > 1 else ()
+        result = _result(task, evaluations[0], ended, attempts, (limits, tighter), fresh, asked)
     combinations = None if combining is None else _beside_next(evaluator, combining.combinations(tighter), fresh_roads)
     return dataclasses.replace(result, combinations=combinations)
 
@@ -175,7 +176,7 @@ def _attempts(
             one.values,
             values[task.objective.name],
             not missed(limits, values, task.tolerance),
-            one.slope_left < task.tolerance.slope,
+            one.slope_left() < task.tolerance.slope,
         )
         for (start, one), values in zip(pairs, numbers, strict=True)
     )
@@ -184,26 +185,24 @@ def _attempts(
 def _status(task: DesignTask[AbstractVehicle], ended: Ended, short: Sequence[Limit]) -> Status:
     if short:
         return Status.LIMIT_NOT_MET
-    if ended.slope_left < task.tolerance.slope:
+    if ended.slope_left() < task.tolerance.slope:
         return Status.CONVERGED
     return Status.STEP_LIMIT if ended.out_of_steps else Status.NO_BETTER_STEP
 
 
 def _result(
-    evaluator: Evaluator[V],
+    task: DesignTask[V],
     start: Evaluation,
     ended: Ended,
     attempts: tuple[Attempt, ...],
     limits: tuple[Sequence[Limit], Sequence[Limit]],
-    max_steps: int,
-    fresh_roads: int,
-    again: int = 0,
+    fresh: Rescore | None,
+    asked: Asked,
 ) -> TuneResult[V]:
     """The result of a tuning, judged: what holds it, what it misses, and what it is worth on fresh roads.
 
-    Limits are those of the task and those of the search, which are tighter after it was repeated so many times.
+    Limits are those of the task and those of the search, which are tighter if it was repeated.
     """
-    task = evaluator.task
     vehicle, space, objective, units = task.vehicle, task.space, task.objective, task.units
     before, after = task.numbers(start.values), task.numbers(ended.evaluation.values)
     idle = without_effect(space, (start, ended.evaluation), ended.values)
@@ -214,11 +213,9 @@ def _result(
     notes += tightened_notes(*limits) + workshop_notes(space) + effect_notes(idle, objective.name)
     notes += bound_notes(space, changes) + start_notes(attempts, objective.name)
     if status in (Status.STEP_LIMIT, Status.NO_BETTER_STEP):
-        notes.append(early_end(ended, max_steps))
+        notes.append(early_end(ended, asked["max_steps"]))
     tuned = space.free.build(jnp.asarray(ended.values, space.free.values.dtype))
     runs, extrapolated = task.notes_on_runs(tuned)
-    realisations = range(again * fresh_roads, (again + 1) * fresh_roads)
-    fresh = _on_fresh_roads(evaluator, (space.start, ended.values), realisations, task.allowed)
     each, reported = _in_scenarios(task, tuned, before, after)
     road = task.road.scenarios[0].road if isinstance(task.road, Scenarios) else task.road
     return TuneResult(
@@ -244,7 +241,7 @@ def _result(
         violated=violations(short, after),
         extrapolated=tuple(extrapolated),
         allowed=task.allowed,
-        elsewhere=_where(task, fresh_roads),
+        elsewhere=_where(task, asked["fresh_roads"]),
         relaxation=_relaxation(task, ended, limits),
     )
 
@@ -329,7 +326,7 @@ def _prices(task: DesignTask[V], ended: Ended, ends: Sequence[LimitEnd]) -> dict
     least, free = task.tolerance.limit, np.array([not side for side in task.space.side(ended.values)])
     free &= ~task.space.is_choice
     tight = [i for i, end in enumerate(ends) if abs(rows[1 + i] - end.sign * end.value) < least * end.scale]
-    if not (tight and free.any() and ended.slope_left < task.tolerance.slope):
+    if not (tight and free.any() and ended.slope_left() < task.tolerance.slope):
         return {}
     multipliers = -np.linalg.lstsq(slopes[1:][tight][:, free].T, slopes[0, free], rcond=None)[0]
     return {i: float(price) for i, price in zip(tight, multipliers, strict=True) if price > 0.0}

@@ -1,6 +1,7 @@
 """What came out of a tuning, in words: better or not, by how much, at what price, what holds it, and doubts."""
 
 import enum
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -67,7 +68,8 @@ def verdict_of(result: "TuneResult[AbstractVehicle]") -> Verdict:
     cost = f"; price: {name} {price:+.1f} %" if name else "; nothing else gets worse"
     held = _limits_in_words(result)
     error = 0.0 if result.fresh is None else 100.0 * result.fresh.half_width(result.metric)
-    lost = [f"{name} is {100 * x:.1f} % beyond its limit" for name, x in lost_limits(result).items()]
+    over = lost_limits(result.fresh, result.allowed)
+    lost = [f"{name} is {100 * x:.1f} % beyond its limit" for name, x in over.items()]
     if lost:
         outcome, first, held = Outcome.LIMIT_LOST, f"Not better: {'; '.join(lost)}; {words}", ""
     elif gain - error > -NOTICED and (result.fresh is None or gain > 0.0):
@@ -144,11 +146,11 @@ def _limits_in_words(result: "TuneResult[AbstractVehicle]") -> str:
     return f"; limits: {'; '.join(texts)}" if texts else ""
 
 
-def lost_limits(result: "TuneResult[AbstractVehicle]") -> dict[str, float]:
+def lost_limits(fresh: "Rescore | None", allowed: Mapping[str, LimitRange]) -> dict[str, float]:
     """The mean excess over limits that are broken on average over fresh roads, by more than the error of this mean."""
-    if result.fresh is None or result.fresh.roads < 2:
+    if fresh is None or fresh.roads < 2:
         return {}
-    over = {name: excess(result.fresh, name, allowed) for name, allowed in result.allowed.items()}
+    over = {name: excess(fresh, name, limit) for name, limit in allowed.items()}
     return {name: float(np.mean(x)) for name, x in over.items() if np.mean(x) - half_interval(x) > WITHIN}
 
 
@@ -188,6 +190,7 @@ def decided(fresh: "Rescore", allowed: Mapping[str, LimitRange]) -> bool:
 
 _ROUNDING = 1e-12  # of a metric, by which its derivative times the parameter counts as zero
 ALIKE = 1e-3  # relative difference of metrics at ends that count as one optimum
+MOST_NAMED = 2  # numbers at bounds that are named with their values; of more, the table of parameters has them
 
 
 def bound_notes(space: SearchRange, changes: tuple[Change, ...]) -> list[str]:
@@ -199,6 +202,10 @@ def bound_notes(space: SearchRange, changes: tuple[Change, ...]) -> list[str]:
     notes = []
     for origin, group in groups.items():
         ends = [f"{c.name} ended {c.note}, {c.after:.5g} {c.unit}".rstrip() for c in group]
+        if len(group) > MOST_NAMED:
+            counts = Counter(c.name.partition("[")[0] for c in group)
+            of = ", ".join(f"{count} of {path}" if count > 1 else path for path, count in counts.items())
+            ends = [f"{len(group)} parameters ended at their bounds: {of}"]
         widen = f"`bounds={{{group[0].name.partition('[')[0]!r}: (lower, upper)}}`"
         reason = {
             "default": f"by default 1/{FACTOR:g} of the start or {FACTOR:g} times it; other bounds: {widen}",
@@ -211,7 +218,7 @@ def bound_notes(space: SearchRange, changes: tuple[Change, ...]) -> list[str]:
 
 def early_end(ended: "Ended", max_steps: int) -> str:
     """Why a search that satisfied all limits did not converge."""
-    slope = f"the remaining slope is {ended.slope_left:.1e} of the metric per 100 % of the parameters"
+    slope = f"the remaining slope is {ended.slope_left():.1e} of the metric per 100 % of the parameters"
     if ended.out_of_steps:
         return f"The search stopped after {max_steps} steps, before an optimum: {slope}. Allow more with `max_steps`."
     return (

@@ -62,6 +62,18 @@ def test_pictures_stand_in_the_page_and_in_the_folder(tmp_path: Path) -> None:
     assert all((tmp_path / name).read_bytes().startswith(b"\x89PNG") for name in ("empty.png", "drawn.png"))
 
 
+def test_what_failed_in_a_part_is_named_on_the_page(tmp_path: Path) -> None:
+    page, part = Report("title", tmp_path), Report("part", {})
+    with part.part("The curve"):
+        raise ValueError("no curve")
+    part.heading("Laws")
+    part.picture(Figure, "drawn", "drawn.png")
+    page.include(part)
+    text = page.to_html()
+    assert "Laws</h2>" in text and "<li>The curve could not be made: no curve</li>" in text
+    assert (tmp_path / "drawn.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_a_picture_that_fails_is_named_at_the_end(tmp_path: Path) -> None:
     def broken() -> Figure:
         raise RuntimeError("no font")

@@ -1,6 +1,8 @@
 """Pages of fits, rides and tunings: what stands on them, without the command line."""
 
+import pickle
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +12,18 @@ from jaxdamp import bench, identify, roads, simulate, tune, vehicles
 from jaxdamp._display import Display, shown_in
 from jaxdamp._words import first_upper, said
 from jaxdamp.bench import SineTest
+from jaxdamp.cli.wording import message
 from jaxdamp.dampers import Bilinear, FittedRange, Linear, with_fitted_range
 from jaxdamp.identify import Comparison
 from jaxdamp.report import (
+    Attempts,
+    FitPart,
+    Report,
     baseline_table,
     bench_report,
     bench_verdict,
     chain_report,
+    chains,
     fit_report,
     law_evaluation,
     ride_report,
@@ -121,6 +128,31 @@ def test_a_page_on_the_whole_chain(comparison: Comparison, rides: dict[str, Resp
         *("Evaluation", "How good the laws are", "The recommended law: bilinear"),
         *("Ride: a bump", "A better damper", "linear"),
     ]
+
+
+def test_the_part_on_laws_may_come_from_another_process(
+    comparison: Comparison, rides: dict[str, Response], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sent = []
+
+    def elsewhere(compute: Callable[[], Report]) -> Callable[[], Report]:
+        sent.append(pickle.dumps(compute))
+        drawn = pickle.dumps(pickle.loads(sent[0])())
+        return lambda: pickle.loads(drawn)
+
+    (at_once := tmp_path / "at once").mkdir()
+    (later := tmp_path / "later").mkdir()
+    with shown_in(Display(units="imperial")):
+        page = chain_report(comparison, {"a bump": rides}, folder=at_once).to_html()
+        monkeypatch.setattr(chains, "elsewhere", elsewhere)
+        laws = FitPart(comparison).begun(Attempts(message=message))
+    monkeypatch.undo()
+    with shown_in(Display(units="imperial")):
+        assert chain_report(comparison, {"a bump": rides}, folder=later, laws=laws).to_html() == page
+    assert len(sent) == 1
+    files = sorted(file.name for file in at_once.iterdir())
+    assert {"damper_sheet.pdf", "force_velocity.png", "ride_sheet.png"} <= set(files)
+    assert sorted(file.name for file in later.iterdir()) == files
 
 
 def test_a_page_on_one_ride_or_several(rides: dict[str, Response], tmp_path: Path) -> None:
