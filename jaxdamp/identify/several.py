@@ -75,19 +75,19 @@ def search_from(problem: Problem, *, starts: int | None, max_steps: int, solver:
         others = _not_among(tried, other_starts(problem.free, problem.reach))
         others = others[: None if starts is None else starts - len(tried)]
         tried, ends = [*tried, *others], [*ends, *_follow(problem, others, best, max_steps, solver)]
-        before = best
-        best = min(
-            (end for end in ends if end.finite),
-            key=lambda end: (1.0 + BETTER * (end is not before)) * end.squares,
-            default=before,
-        )
-        if best is not before:
-            whole = _to_its_end(problem, best, max_steps, solver)
-            ends, best = [whole if end is best else end for end in ends], whole
+        before, end = best, _least(ends, best)
+        best = end if end is before else _to_its_end(problem, end, max_steps, solver)
+        ends = [best if one is end else one for one in ends]
         if before.finite and best.squares >= (1.0 - WORTH_A_ROUND) * before.squares:
             break
         problem = problem.started_at(best.values)
     return Solution(best, tuple(end for end in ends if end.finite and (end.converged or end is best)), len(tried))
+
+
+def _least(ends: Sequence[SearchEnd], before: SearchEnd) -> SearchEnd:
+    """The end with the least sum of squares; the one before where no other is better."""
+    finite = (end for end in ends if end.finite)
+    return min(finite, key=lambda end: (1.0 + BETTER * (end is not before)) * end.squares, default=before)
 
 
 def _not_among(tried: Sequence[np.ndarray], others: Sequence[np.ndarray]) -> list[np.ndarray]:
