@@ -49,7 +49,7 @@ def _check_law(command: str, name: str, path: Path) -> None:
     if command == "bench" and path.suffix != ".json":  # other records
         find_files(path, FOLDER_SUFFIXES)
         return
-    either = command == "export" or (name == "baseline" and command in ("tune", "sweep"))
+    either = command == "export" or (name == "baseline" and command in ("ride", "tune", "sweep"))
     words, remedy = ("a law or a vehicle", FROM_BOTH) if either else ("a law", FROM_FIT)
     read_json(name, path, words, remedy)
 

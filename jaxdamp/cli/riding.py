@@ -14,7 +14,7 @@ from jaxdamp.cli.controlling import Controlling
 from jaxdamp.cli.early import refuse_road
 from jaxdamp.cli.jobs import Output, job, with_step_warnings, without_range_warnings, write_tables
 from jaxdamp.cli.options import Call
-from jaxdamp.cli.vehicle_words import parse_vehicle, read_law
+from jaxdamp.cli.vehicle_words import law_of, parse_vehicle, read_baseline, read_law
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import match_paths, named_parameters
 from jaxdamp.report import Table, axles_sentence, notes_of, ride_report, ride_tables, ride_verdict
@@ -105,7 +105,7 @@ def unusual(road: str, speed: float) -> list[str]:
         height, length = map(float, size)
         if height > HIGHEST_BUMP or length > LONGEST_BUMP:
             remedy = f"Both are in m: if mm were meant, write bump:{1e-3 * height:g}:{1e-3 * length:g}."
-            notes.append(f"unusual: --road {road} is {height:g} m high and {length:g} m long. {remedy}")
+            notes.append(f"unusual: {road} is {height:g} m high and {length:g} m long. {remedy}")
     return notes
 
 
@@ -134,25 +134,28 @@ def beyond_vehicles(car: AbstractVehicle, over: Mapping[str, np.ndarray]) -> lis
 
 def ride(
     screen: Screen,
-    law: Path,
-    *,
-    vehicle: str = "quarter_car_000",
+    vehicle: str,
     road: str = "iso:C",
+    *,
+    start: Path | None = None,
     driving: Driving,
     how: Annotated[Call, "simulation.simulate"],
     controlling: Controlling,
     baseline: Path | None = None,
     output: Output,
 ) -> None:
-    """Ride on a law: metrics, comfort by ISO 2631-1 and pictures, beside a baseline.
+    """Ride on a road: metrics, comfort by ISO 2631-1 and pictures, beside a baseline.
 
-    The law is at every damper of the vehicle.
+    The vehicle has its own dampers, or the law of --start at every one.
+
+    Arguments:
+        baseline: to compare with: another law, or another vehicle, as JSON.
     """
-    make = parse_vehicle(vehicle)
-    if baseline is None and controlling.controller is not None:
-        baseline = law  # at its own command
-    files = ({} if baseline is None else {"baseline": baseline}) | {"law": law}
-    laws = {name: read_law(name, path) for name, path in files.items()}
+    law, make = None if start is None else read_law("start", start), parse_vehicle(vehicle)
+    own, name = make(law), "vehicle" if law is None else "law"
+    cars = {name: controlling.of(own, law)}
+    if baseline is not None or controlling.controller is not None:  # at its own command
+        cars = {"baseline": own if baseline is None else read_baseline(baseline, own)} | cars
     (surface,), run = driving.over(road)
     if not isinstance(surface, AbstractRoad):
         refuse_road(road)
@@ -161,10 +164,9 @@ def ride(
     with job(screen, "ride", output) as work:
         responses: dict[str, Response] = {}
         remarks: list[str] = []
-        with screen.stage("Driving", total=len(laws)) as advance:
-            for done, (name, damper) in enumerate(laws.items()):
+        with screen.stage("Driving", total=len(cars)) as advance:
+            for done, (name, car) in enumerate(cars.items()):
                 advance(name, done)
-                car = controlling.of(make(damper), damper) if name == "law" else make(damper)
                 with without_range_warnings():
                     responses[name], warned = with_step_warnings(
                         lambda car=car: simulate(car, surface, **how.arguments(**run))
@@ -177,6 +179,7 @@ def ride(
         if axles:
             screen.say(axles)
         title = f"{vehicle} on {road} at {display().speed(driving.speed)}"
+        laws = {name: law for name, car in cars.items() if (law := law_of(car.passive)) is not None}
         with work.saving("Tables and channels") as draft:
             _write(draft, laws, responses)
             write_tables(draft, tables)
@@ -205,8 +208,8 @@ def headline(screen: Screen, table: Table, vehicle: AbstractVehicle, more: Colle
 def _write(folder: Path, laws: Mapping[str, AbstractDamper], responses: Mapping[str, Response]) -> None:
     """Laws and channels."""
     for name, law in laws.items():
-        export.to_json(law, folder / f"{name}.json")
-    car = responses["law"].vehicle
+        export.to_json(law, folder / f"{'law' if name == 'vehicle' else name}.json")
+    *_, car = (response.vehicle for response in responses.values())
     if car.passive is not car:
         export.to_json(car, folder / "vehicle.json")  # `jaxdamp export` makes C of its controller
     for name, response in responses.items():

@@ -23,10 +23,10 @@ from jaxdamp.cli.limits import axes_in_si, bounds_in_si, in_si
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.riding import Driving, beyond_vehicles, unusual
 from jaxdamp.cli.signatures import Arguments
-from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, read_module, with_law, write_laws
+from jaxdamp.cli.vehicle_words import parse_vehicle, read_baseline, read_law, write_laws
 from jaxdamp.cli.words import Axis, Limit
 from jaxdamp.control import Controlled
-from jaxdamp.dampers import AbstractDamper, Scheduled
+from jaxdamp.dampers import Scheduled
 from jaxdamp.parameters import match_paths, modules_inside, named_parameters
 from jaxdamp.report import MOST_POINTS, Table, best_points, sweep_report, tuning_report
 from jaxdamp.roads import AbstractRoad, WhiteRoad
@@ -119,7 +119,7 @@ def tune_command(
     """
     law = None if start is None else read_law("start", start)
     car = parse_vehicle(vehicle)(law)
-    beside = None if baseline is None else _baseline(baseline, car)
+    beside = None if baseline is None else read_baseline(baseline, car)
     surfaces, run = _realisations(road, driving, roads)
     if controlling.controller is not None:
         car = controlling.of(car, law)
@@ -187,13 +187,6 @@ def tuned(screen: Screen, call: Arguments) -> TuneResult:
     return result
 
 
-def _baseline(path: Path, car: AbstractVehicle) -> AbstractVehicle:
-    """The vehicle of the option --baseline: with another law, or that of another tuning."""
-    kinds, words = (AbstractDamper, type(car)), f"a law or a {type(car).__name__}"
-    module = read_module("baseline", path, kinds, words, "`jaxdamp tune` writes law.json and vehicle.json.")
-    return with_law(car, module) if isinstance(module, AbstractDamper) else module
-
-
 def exit_code_of(result: TuneResult | None) -> None:
     """End with exit code 1 if a limit is not met."""
     if result is not None and result.status is Status.LIMIT_NOT_MET:
@@ -258,7 +251,7 @@ def sweep_command(
     names = [name for word in metric for name in _metrics_of("metric", word, car, white=white)]
     names = list(dict.fromkeys([*names, *limits]))
     limit_spans(limits, names, dict.fromkeys(names, 1.0))  # refuses what is no limit before anything is driven
-    beside = None if baseline is None else _baseline(baseline, car)
+    beside = None if baseline is None else read_baseline(baseline, car)
     ride = Ride(car, surface, metrics=names, **run)
     axes = axes_in_si(over, car)
     ride({name: values[0] for name, values in axes.items() if not ride.out_of_domain({name: values[:1]})[0]})

@@ -10,7 +10,7 @@ import equinox as eqx
 from jaxdamp import _checks, export, vehicles
 from jaxdamp._tables import Contents
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.early import EXAMPLE, FROM_FIT, FROM_LIST, read_json, read_vehicle
+from jaxdamp.cli.early import EXAMPLE, FROM_FIT, read_json, read_vehicle
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import laws_table
 from jaxdamp.parameters import get, matching, replace
@@ -63,7 +63,8 @@ def parse_vehicle(word: str) -> MakeCar:
         _checks.one_of("vehicle", word, presets())
         return lambda law: presets()[word](damper=law)
     if path.suffix == ".json":
-        car = read_module("vehicle", path, AbstractVehicle, "a vehicle", FROM_LIST)
+        remedy = 'Or give a name, see "jaxdamp vehicles"; a law is put into one with --start.'
+        car = read_module("vehicle", path, AbstractVehicle, "a vehicle", remedy)
         return lambda law: car if law is None else with_law(car, law)
     return _preset(word, read_vehicle(path))
 
@@ -71,6 +72,13 @@ def parse_vehicle(word: str) -> MakeCar:
 def read_law(argument: str, path: Path) -> AbstractDamper:
     """The law of a JSON file."""
     return read_module(argument, path, AbstractDamper, "a law", FROM_FIT)
+
+
+def read_baseline(path: Path, car: AbstractVehicle) -> AbstractVehicle:
+    """The vehicle of the option --baseline: this one with another law, or another one of its kind."""
+    kinds, words = (AbstractDamper, type(car)), f"a law or a {type(car).__name__}"
+    module = read_module("baseline", path, kinds, words, "`jaxdamp tune` writes law.json and vehicle.json.")
+    return with_law(car, module) if isinstance(module, AbstractDamper) else module
 
 
 def read_module(argument: str, path: Path, kinds: type[T] | tuple[type[T], ...], words: str, remedy: str = "") -> T:
@@ -115,14 +123,22 @@ def with_law(vehicle: AbstractVehicle, law: AbstractDamper) -> AbstractVehicle:
     return vehicle
 
 
+def law_of(vehicle: AbstractVehicle) -> AbstractDamper | None:
+    """The law that all dampers of a vehicle have; None where they differ."""
+    first, *others = [*dampers_of(vehicle).values()] or [None]
+    return first if all(bool(eqx.tree_equal(first, law)) for law in others) else None
+
+
+def dampers_of(vehicle: AbstractVehicle) -> dict[str, AbstractDamper]:
+    """The laws at the dampers of a vehicle by their paths."""
+    return {path: get(vehicle, path) for path in matching(damper_paths(vehicle), "*damper")}
+
+
 def write_laws(folder: Path, vehicle: AbstractVehicle) -> None:
     """The dampers of a vehicle as JSON: law.json if all are alike, otherwise a file named after each path."""
-    laws = {path: get(vehicle, path) for path in matching(damper_paths(vehicle), "*damper")}
-    first, *others = laws.values() or [None]
-    if first is not None and all(bool(eqx.tree_equal(first, law)) for law in others):
-        laws = {"law": first}
-    for path, law in laws.items():
-        export.to_json(law, folder / f"{path.replace('.', '_')}.json")
+    law = law_of(vehicle)
+    for path, one in (dampers_of(vehicle) if law is None else {"law": law}).items():
+        export.to_json(one, folder / f"{path.replace('.', '_')}.json")
 
 
 def damper_places(vehicle: AbstractVehicle) -> list[str]:

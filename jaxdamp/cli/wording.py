@@ -17,7 +17,7 @@ OTHER_WORDS = {
     "reversed_channels": "Option --reversed",
     "file": "The store",
     "channel": "A channel of --units or --reversed",
-    "road_class": "CLASS in --road iso:CLASS",
+    "road_class": "CLASS in iso:CLASS",
     "skip_cycles": "Option --cycles",
     "start": "The beginning in --between",
     "metric": "Option --minimise",

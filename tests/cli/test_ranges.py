@@ -31,8 +31,8 @@ def test_a_fit_states_the_range_and_writes_it_into_the_law(records: Path, tmp_pa
 def test_a_ride_beyond_the_range_is_said_in_table_report_and_words(tmp_path: Path) -> None:
     law, out = tmp_path / "law.json", tmp_path / "ride"
     to_json(with_fitted_range(Bilinear(2600.0, 1200.0), SLOW), law)
-    words = ["--vehicle", "half_car_002", "--road", "bump:0.05:4", "--speed", "16", "--duration", "2", "--dt", "0.002"]
-    text = " ".join(jaxdamp("ride", law, *words, "--out", out, "--verbose").output.split())
+    words = ["half_car_002", "bump:0.05:4", "--speed", "16", "--duration", "2", "--dt", "0.002"]
+    text = " ".join(jaxdamp("ride", *words, "--start", law, "--out", out, "--verbose").output.split())
     assert "Use of the dampers beside the records of their laws" in text and "law: front damper: velocity" in text
     rows = list(csv.DictReader((out / "range_use.csv").read_text().splitlines()))
     assert [(row["damper"], row["quantity"]) for row in rows] == [

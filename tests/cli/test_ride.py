@@ -15,7 +15,8 @@ from jaxdamp.cli.vehicle_words import presets
 from jaxdamp.cli.wording import in_command_line
 from jaxdamp.control import Controlled, Skyhook
 from jaxdamp.dampers import AbstractDamper, Bilinear, Linear, Scheduled
-from jaxdamp.export import to_json
+from jaxdamp.export import from_json, to_json
+from jaxdamp.parameters import replace
 
 from .invoking import jaxdamp, refused
 
@@ -33,20 +34,8 @@ def _written(law: AbstractDamper, path: Path) -> Path:
 @pytest.mark.pictures
 def test_ride_compares_a_law_with_a_baseline(law: Path, tmp_path: Path) -> None:
     base, out = _written(Linear(1500.0), tmp_path / "base.json"), tmp_path / "ride"
-    words = [
-        "--vehicle",
-        "half_car_002",
-        "--road",
-        "bump:0.05:4",
-        "--speed",
-        "16",
-        "--duration",
-        "2",
-        "--dt",
-        "0.002",
-        "--verbose",
-    ]
-    text = jaxdamp("ride", law, "--baseline", base, *words, "--out", out).output
+    words = ["--speed", "16", "--duration", "2", "--dt", "0.002", "--verbose", "--out", out]
+    text = jaxdamp("ride", "half_car_002", "bump:0.05:4", "--start", law, "--baseline", base, *words).output
     assert "Axles: rear axle 0.156 s behind the front (2.5 m at 16 m/s)." in text
     assert "rear axle 0.156 s" in (out / "report.html").read_text()
     assert "rms_pitch_acceleration" in text and "baseline" in text and "Comfort by ISO 2631-1" in text
@@ -68,16 +57,16 @@ def test_ride_compares_a_law_with_a_baseline(law: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--vehicle", "half_car_02"], "Did you mean 'half_car_002'?"),
-        (["--road", "iso:K"], "CLASS in --road iso:CLASS must be one of 'A'"),
-        (["--road", "bump:3"], "Option --road must read like bump:HEIGHT:LENGTH"),
-        (["--road", "nothing.csv"], "a file that is there, but is 'nothing.csv'"),
-        (["--speed", "-3"], "Option --speed must be positive"),
-        (["--dt", "0.1"], "a fifth of the period of the fastest mode that follows the road"),
+        (["half_car_02"], "Did you mean 'half_car_002'?"),
+        (["quarter_car_000", "iso:K"], "CLASS in iso:CLASS must be one of 'A'"),
+        (["quarter_car_000", "bump:3"], "ROAD must read like bump:HEIGHT:LENGTH"),
+        (["quarter_car_000", "nothing.csv"], "a file that is there, but is 'nothing.csv'"),
+        (["quarter_car_000", "--speed", "-3"], "Option --speed must be positive"),
+        (["quarter_car_000", "--dt", "0.1"], "a fifth of the period of the fastest mode that follows the road"),
     ],
 )
 def test_wrong_words_are_refused(law: Path, tmp_path: Path, words: list[str], message: str) -> None:
-    assert message in refused(tmp_path, "ride", law, *words, "--out", tmp_path / "out")
+    assert message in refused(tmp_path, "ride", *words, "--start", law, "--out", tmp_path / "out")
 
 
 @pytest.mark.pictures
@@ -86,7 +75,7 @@ def test_a_controller_is_compared_with_the_law_at_its_own_command(tmp_path: Path
     words = ["--controller", "skyhook:gain=3000,lead=0.01", "--delay", "0.002", "--actuator-lag", "0.003"]
     out = tmp_path / "ride"
     law = _written(damper, tmp_path / "law.json")
-    jaxdamp("ride", law, "--vehicle", "half_car_002", "--duration", "1", *words, "--out", out)
+    jaxdamp("ride", "half_car_002", "--start", law, "--duration", "1", *words, "--out", out)
     rows = {row["metric"]: row for row in csv.DictReader((out / "metrics.csv").read_text().splitlines())}
     car, road = vehicles.presets.half_car_002(damper), roads.iso8608("C", 20.0, 1.0, seed=0)
     controlled = Controlled(car, Skyhook(3000.0, 0.01), actuator_lag=0.003, delay=0.002)
@@ -97,7 +86,24 @@ def test_a_controller_is_compared_with_the_law_at_its_own_command(tmp_path: Path
     jaxdamp("export", out / "vehicle.json", "--to", "c", "--part", "controller", "--file", tmp_path / "ecu.c")
     assert "p->policy_gain = 3000.0;" in (tmp_path / "ecu.c").read_text()
     with pytest.raises(AssertionError, match="take a command"):
-        jaxdamp("ride", _written(Linear(1500.0), tmp_path / "linear.json"), *words, "--out", tmp_path / "other")
+        linear = _written(Linear(1500.0), tmp_path / "linear.json")
+        jaxdamp("ride", "quarter_car_000", "--start", linear, *words, "--out", tmp_path / "other")
+
+
+def test_a_vehicle_rides_on_its_own_dampers_beside_another_one(tmp_path: Path) -> None:
+    car, out = vehicles.presets.half_car_002(Linear(1500.0)), tmp_path / "ride"
+    to_json(replace(car, {"front.damper.rate": 2500.0}), tmp_path / "other.json")
+    words = ["--baseline", tmp_path / "other.json", "--duration", "1", "--out", out]
+    to_json(car, tmp_path / "car.json")
+    jaxdamp("ride", tmp_path / "car.json", *words)
+    files = {file.name for file in out.iterdir()}
+    assert {"law.json", "channels_vehicle.csv"} <= files and not {"baseline.json", "vehicle.json"} & files
+    assert from_json(out / "law.json").rate == 1500.0
+    rows = {row["metric"]: row for row in csv.DictReader((out / "metrics.csv").read_text().splitlines())}
+    expected = simulate(car, roads.iso8608("C", 20.0, 1.0, seed=0), duration=1.0).metrics(["comfort"])
+    ((name, value),) = expected.items()
+    assert float(rows[name]["vehicle"]) == pytest.approx(float(value), rel=1e-9)
+    assert rows[name]["baseline"] != rows[name]["vehicle"]
 
 
 @pytest.mark.parametrize(
