@@ -142,9 +142,10 @@ def on_status(best: SearchEnd, unsettled: Sequence[str], remedy: str = "") -> li
         return (
             [] if best.converged else [f"The search did not converge: {best.status.sentence} {more}{remedy}".rstrip()]
         )
+    differ = "differs" if len(unsettled) == 1 else "differ"
     who = ", ".join(unsettled[:3]) + f" and {len(unsettled) - 3} others" * (len(unsettled) > 3)
     return [
-        f"The search did not converge: it ended where {who} differ by more than a standard error from the minimum that"
+        f"The search did not converge: it ended where {who} {differ} by more than a standard error from the minimum that"
         " the derivatives show, at a kink of the sum of squares, such as a knot at a sample, or by a loose tolerance. "
         "Other values fit nearly as well. Freeze the numbers that place kinks, such as knots, or take a law with fewer."
     ]
