@@ -137,17 +137,18 @@ def on_status(best: SearchEnd, unsettled: Sequence[str], remedy: str = "") -> li
         unsettled: numbers that are not where the derivatives place the minimum, though the search found no better step.
         remedy: what helps after too few steps.
     """
+    if best.converged and not unsettled:
+        return []
     if not unsettled:
         more = "Allow more steps. " * (best.status is Status.STEP_LIMIT)
-        return (
-            [] if best.converged else [f"The search did not converge: {best.status.sentence} {more}{remedy}".rstrip()]
-        )
+        return [f"The search did not converge: {best.status.sentence} {more}{remedy}".rstrip()]
     differ = "differs" if len(unsettled) == 1 else "differ"
     who = ", ".join(unsettled[:3]) + f" and {len(unsettled) - 3} others" * (len(unsettled) > 3)
     return [
-        f"The search did not converge: it ended where {who} {differ} by more than a standard error from the minimum that"
-        " the derivatives show, at a kink of the sum of squares, such as a knot at a sample, or by a loose tolerance. "
-        "Other values fit nearly as well. Freeze the numbers that place kinks, such as knots, or take a law with fewer."
+        f"The search did not converge: it ended where {who} {differ} by more than a standard error from the minimum "
+        "that the derivatives show, at a kink of the sum of squares, such as a knot at a sample, or by a loose "
+        "tolerance. Other values fit nearly as well. Freeze the numbers that place kinks, such as knots, or take a law "
+        "with fewer."
     ]
 
 
