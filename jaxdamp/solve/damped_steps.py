@@ -36,6 +36,7 @@ FIRM = 1e4  # weight of a limit of several coordinates, relative to the data; it
 ROUNDING = 500.0  # rounding errors of a sum of squares, in those of one number
 SLACK = 1e-9  # beyond a limit, that is a rounding error: a limit of one coordinate may stand twice
 WORTH = 0.1  # standard errors: a decrease that counts, where the damping begins anew
+LEAST_SCALE = 1e-2  # of that before, where the damping begins anew: what the data hardly show would run away
 PATIENCE = 30  # points tried without one
 KINK = 0.01  # standard errors: a refused step that is predicted to gain less will only become shorter
 TOGETHER = 5  # solutions of one step, after which one limit at a time is exchanged, which ends
@@ -147,7 +148,8 @@ def judged(xp: ModuleType, rules: Rules, state: State, here: Linearisation, aux:
     else:
         ends = blocked | (idle >= PATIENCE)
         anew = ~first & ~negligible & ends & improved
-    chosen["scale"] = xp.where(anew[..., None], _norms(xp, chosen["triangle"]), chosen["scale"])
+    afresh = xp.maximum(_norms(xp, chosen["triangle"]), LEAST_SCALE * chosen["scale"])
+    chosen["scale"] = xp.where(anew[..., None], afresh, chosen["scale"])
     changes = {
         "step_size": xp.where(anew, 1.0, step_size),
         "converged": ~first & (negligible | ends) & ~anew,
