@@ -3,9 +3,10 @@
     python -m benchmarks.first_result [DYNO FILES]
 
 The files, all of one damper and counted positive in rebound, are also fitted at the command line: the first one by the
-laws that suit it, also with a delay of the machine, all of them by every law. Without files there is one, of a virtual
-damper, written before the clock starts. Wall and processor time stand in seconds and in bases, of which one is a new
-process that imports jax and compiles x * x; beside them the number of XLA programs.
+laws that suit it, also with a delay of the machine, all of them by every law; then `report` on all of them, `demo`, and
+a command that fails. Without files there is one, of a virtual damper, written before the clock starts.
+Wall and processor time stand in seconds and in bases, of which one is a new process that imports jax and compiles
+x * x; beside them the number of XLA programs.
 """
 
 import os
@@ -41,6 +42,12 @@ print(identify.fit(law, runs).rmse)
 
 
 BASE = "import jax; jax.jit(lambda x: x * x)(1.0)"
+COMMAND = """
+import sys
+from jaxdamp.cli import app
+sys.argv[:] = ["jaxdamp", *{words!r}]
+app()
+"""
 COUNTED = """
 import atexit, sys
 import jax.monitoring
@@ -49,18 +56,15 @@ jax.monitoring.register_event_duration_secs_listener(
     lambda name, *_, **__: programs.append(name) if name.endswith("backend_compile_duration") else None
 )
 atexit.register(lambda: print("programs:", len(programs), file=sys.stderr))
-from jaxdamp.cli import app
-sys.argv[:] = ["jaxdamp", "fit", *{files!r}, *{options!r}, "--sign", "rebound-positive", "--out", {out!r}]
-app()
-"""
+"""  # without it, a command that fails loads no JAX
 
 
-def cost(script: str, cache: str) -> tuple[float, float, str]:
+def cost(script: str, cache: str, code: int = 0) -> tuple[float, float, str]:
     """Wall and processor seconds of a new process, and what it says of its XLA programs."""
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     surroundings = os.environ | {"XDG_CACHE_HOME": cache}
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=surroundings)
-    if done.returncode:
+    if done.returncode != code:
         raise RuntimeError(done.stderr)
     wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
     used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
@@ -107,19 +111,25 @@ def report_fits(files: list[str]) -> None:
         files = files or [dyno_file(folder)]
         base = [min(each) for each in zip(*(cost(BASE, folder)[:2] for _ in range(3)), strict=True)]
         rows: list[list[Any]] = [["base", *base, 1.0, 1.0, ""]]
+        missing = str(Path(folder) / "none.csv")
+        some, sign = files[:1], ["--sign", "rebound-positive"]
         asked = {
-            "one file, laws that suit it": (files[:1], []),
-            "one file, with a delay of the machine": (files[:1], ["--rig", "offset,delay"]),
-            f"{len(files)} files, all laws": (files, ["--law", "all"]),
+            "fit, one file, laws that suit it": ["fit", *some, *sign],
+            "fit, one file, with a delay of the machine": ["fit", *some, *sign, "--rig", "offset,delay"],
+            f"fit, {len(files)} files, all laws": ["fit", *files, *sign, "--law", "all"],
+            f"report, {len(files)} files": ["report", *files, *sign],
+            "demo": ["demo"],
+            "fit, a file that is not there": ["fit", missing],
         }
-        for name, (some, options) in asked.items():
+        for name, words in asked.items():
             for again in ("", ", again"):
-                out = str(Path(folder) / f"{len(rows)}")
-                script = COUNTED.format(files=some, options=options, out=out)
-                wall, used, programs = cost(script, str(Path(folder) / f"cache {name}"))
-                rows.append([f"jaxdamp fit, {name}{again}", wall, used, wall / base[0], used / base[1], programs])
+                out = ["--out", str(Path(folder) / f"{len(rows)}")]
+                script, fails = COMMAND.format(words=[*words, *out]), words[-1] == missing
+                cache = str(Path(folder) / f"cache {name}")
+                wall, used, programs = cost(script, cache, 2) if fails else cost(COUNTED + script, cache)
+                rows.append([f"jaxdamp {name}{again}", wall, used, wall / base[0], used / base[1], programs])
     head = ["what", "wall, s", "processor, s", "bases, wall", "bases, processor", "XLA programs"]
-    report("first_fits", "Fits of the command line", head, rows)
+    report("first_fits", "Commands", head, rows)
 
 
 if __name__ == "__main__":

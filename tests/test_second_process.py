@@ -16,10 +16,11 @@ class Record:
     pass
 
 def where(*of): return os.getpid(), of
+def times(of): of.times = getattr(of, "times", 0) + 1; return of.times
 def refused(): raise ValueError("no")
 def ends(): os.getpid() == parent or os._exit(3); return os.getpid()
 
-parent, record = os.getpid(), Record()
+parent, record, other = os.getpid(), Record(), Record()
 os.sched_getaffinity = lambda pid: {0, 1}
 with second.opened(lambda: None):
     assert second.count() == 1
@@ -27,6 +28,8 @@ with second.opened(lambda: None):
     assert second.elsewhere(where) is None, "one process computes one thing"
     pid, (same,) = waiting()
     assert pid != parent and same is record, "what both know comes back as it is"
+    counts = [second.elsewhere(times, each, shared=[each])() for each in (record, other, record)]
+    assert counts == [1, 1, 2], "each is sent once"
     assert second.anywhere(where)[0] == parent, "this process has nothing to do"
     try:
         second.elsewhere(refused)()

@@ -36,11 +36,18 @@ class Combinations:
     def sentence(self) -> str:
         """The best combination, of how many, and how it stands beside the next."""
         count, met = len(self.met), int(np.count_nonzero(self.met))
-        within = "" if met == count else f", of which {met} within the limits"
+        missing = int(np.count_nonzero(self._without_number))
+        within = [f"{met} within the limits"] * (met < count - missing)
+        within += [f"{missing} without a number"] * (missing > 0)
         without = f" ({self.impossible} more are impossible)" * bool(self.impossible)
-        first = f"{self.at(0)} is the best of {count} combination{'s' * (count > 1)}{without}{within}"
+        first = f"{self.at(0)} is the best of {count} combination{'s' * (count > 1)}{without}"
+        first += f", of which {' and '.join(within)}" * bool(within)
         none = f"{self.at(0)} is the nearest to the limits of {count}"
         return ", ".join(filter(None, (first if met else none, self.beside_next)))
+
+    @property
+    def _without_number(self) -> Bool[np.ndarray, " combinations"]:
+        return np.any(np.isnan(np.stack([*self.metrics.values()])), axis=0)
 
     def at(self, place: int) -> str:
         """One combination in words, the best being the first."""
@@ -49,8 +56,8 @@ class Combinations:
     def table(self) -> Table:
         """A row for each combination: its numbers, its metrics, and whether it meets the limits."""
         columns = [Column(name, self.units[name]) for name in (*self.choices, *self.metrics)]
-        words = ["met" if ok else "not met" for ok in self.met]
-        rows = zip(*self.choices.values(), *self.metrics.values(), words, strict=True)
+        words = np.where(self.met, "met", np.where(self._without_number, "no number", "not met"))
+        rows = zip(*self.choices.values(), *self.metrics.values(), words.tolist(), strict=True)
         return Table("All combinations", (*columns, Column("limits")), tuple(rows))
 
     def to_dict(self) -> Contents:

@@ -12,7 +12,7 @@ from jaxdamp._limits import ramp
 from jaxdamp._root import increasing_root
 from jaxdamp.codegen import C, Signature, library, with_slopes
 from jaxdamp.codegen._branches import in_branches
-from jaxdamp.codegen._program import Branch, Declare, Define, Variable
+from jaxdamp.codegen._program import Assign, Branch, Declare, Define, Loop, Variable, constant
 
 
 LANES = 4
@@ -105,5 +105,7 @@ def test_only_what_one_side_takes_alone_is_in_a_branch() -> None:
         assert in_branches(before, (), outside) == before
     assert in_branches(before, [Define(number("more"), "neg", (costly,))], {"chosen", "more"}) == before
     assert in_branches(before, (), {"chosen"}, changing=["case"]) == before  # a loop may have changed it meanwhile
+    looped = [Declare(case, constant(0, "bool")), before[1], Loop([Assign(case, before[0].target)]), *before[2:]]
+    assert in_branches(looped, (), {"chosen"}) == looped  # a loop assigns it after what one side takes
     late = [before[1], before[0], *before[2:]]
     assert in_branches(late, (), {"chosen"}) == late  # the condition is not known where it is computed

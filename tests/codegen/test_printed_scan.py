@@ -74,14 +74,18 @@ def test_limits_and_numbers_that_are_not_finite():
     limit = jnp.linspace(0.5, 3.0, 40).at[3].set(jnp.nan).at[4].set(jnp.inf)
     start = jnp.linspace(0.0, 2.0, 40).at[5].set(jnp.nan)
 
+    def step(limit, now, row):
+        x, y = now
+        return jnp.maximum(jnp.minimum(x + row[0], limit), -limit + row[1]), jnp.minimum(limit, y + row[0])
+
     def run(scan):
         def of_point(limit, start):
-            return scan(lambda x, row: jnp.maximum(jnp.minimum(x + row[0], limit), -limit + row[1]), start, ROWS)
+            return jnp.stack(scan(partial(step, limit), (start, start), ROWS))
 
         return np.asarray(jax.vmap(of_point)(limit, start))
 
     printed, plain = run(printed_scan), run(by_jax)
-    assert np.isnan(printed[[3, 5]]).all() and np.isfinite(np.delete(printed, [3, 5])).all()
+    assert np.isnan(printed[[3, 5]]).all() and np.isfinite(np.delete(printed, [3, 5], axis=0)).all()
     np.testing.assert_allclose(printed, plain, rtol=1e-14)
 
 
@@ -126,6 +130,9 @@ def test_knees_take_exponentials_only_where_they_are_rounded(monkeypatch):
         np.testing.assert_allclose(printed, plain, rtol=1e-12)
     simple, rounded = re.findall(r"IN_TURN \{(.*?)\n {16}\}", texts[-1], re.DOTALL)
     assert "exp(" not in simple and "exp(" in rounded and "? loaded0 : loaded1" in simple
+    widths = jnp.tile(jnp.array([0.0, 0.2]), 20)  # side by side there are sharp and rounded ones
+    each = [jax.jit(jax.vmap(partial(run, scan), (0, 0, None)))(rates, widths, 2.0) for scan in SCANS]
+    np.testing.assert_allclose(*each, rtol=1e-12)
 
 
 @pytest.mark.parametrize("law", ["power", "rounded knees"])

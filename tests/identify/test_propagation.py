@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
+from scipy.signal import lfilter
 
 from jaxdamp import Ride, plots, roads, vehicles
 from jaxdamp.dampers import Bilinear, Linear, Saturating, SeriesSpring, Table
@@ -83,6 +84,13 @@ def test_what_nothing_shows_is_infinite(bilinear, sines):
     assert np.all(np.isfinite(errors[:3])) and np.isinf(errors[4])
     with pytest.raises(ValueError, match="finite standard errors"):
         blind.propagate(lambda law: law.force_points, samples=10)
+    name = "force_points[4]"
+    curve = blind.profile(name)
+    assert curve.interval == (-np.inf, np.inf) and curve.warnings == (
+        f"The records do not bound {name} on both sides.",
+    )
+    bounded = fit(table, blind.runs, bounds={"force_points": (-1e7, 1e7)}).profile(name)
+    assert bounded.interval == (-1e7, 1e7) and not bounded.warnings
     with pytest.raises(ValueError, match="evidence"):
         dataclasses.replace(bilinear, evidence=None).band(np.array([0.1]))
 
@@ -90,10 +98,25 @@ def test_what_nothing_shows_is_infinite(bilinear, sines):
 def test_the_profile_of_a_linear_law_is_its_parabola(bilinear):
     rate, curve = bilinear["rebound_rate"], bilinear.profile("rebound_rate")
     np.testing.assert_allclose(curve.cost, ((curve.values - rate.value) / rate.standard_error) ** 2, atol=1e-6)
-    np.testing.assert_allclose(curve.interval, rate.interval, rtol=1e-6)
+    ends, expected = (np.array(interval) - rate.value for interval in (curve.interval, rate.interval))
+    np.testing.assert_allclose(ends, expected, rtol=1e-4)  # Student's t, not 1.96
     assert len(curve.plot().axes[0].get_lines()) >= 4
     with pytest.raises(KeyError, match="rebound_rat"):
         bilinear.profile("rebound_rat")
+
+
+def test_a_profile_counts_noise_with_a_memory_as_the_standard_error_does(sines):
+    """It is greater for an offset than for what goes to and fro."""
+    rng = np.random.default_rng(0)
+    runs = [
+        dataclasses.replace(run, force=run.force + lfilter([1.0], [1.0, -0.98], rng.standard_normal(len(run))))
+        for run in sines(Linear(2000.0))
+    ]
+    result = fit(Linear, runs, rig="offset")
+    assert result.inflation > 3.0
+    for one in result.parameters:
+        ends = np.array(result.profile(one.name).interval) - one.value
+        np.testing.assert_allclose(ends, np.array(one.interval) - one.value, rtol=1e-3)
 
 
 def test_the_profile_of_a_banana(curved):

@@ -78,6 +78,8 @@ def test_a_law_that_misses_something_has_errors_of_that_size(sines):
     error = np.hypot(one["compression_rate"].standard_error, other["compression_rate"].standard_error)
     assert apart < 4.0 * error
     assert min(one.inflation, other.inflation) > 3.0
+    samples = sum(map(len, one.runs)) / one.inflation**2
+    assert one._evidence.noise.dof == pytest.approx(samples - 2.0)
 
 
 def test_partners_count_as_unknown(rng):

@@ -63,6 +63,9 @@ def test_a_name_is_that_of_the_vehicle_alone_if_it_is_a_whole_path_there():
 def test_the_weights_are_the_noise_of_each_channel(motions):
     assert {score.channel: score.rmse for score in motions.scores} == pytest.approx(NOISE, rel=0.06)
     assert motions.inflation == 1.0
+    noise, end = motions._evidence.noise, motions._evidence.minimum
+    count, free = end.jacobian.shape
+    assert float(np.mean(noise.sigma**2)) == pytest.approx(end.squares / (count - free), rel=1e-6)
 
 
 def test_a_result_shows_itself(motions, record):

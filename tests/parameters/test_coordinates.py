@@ -48,6 +48,13 @@ def test_coordinates_within_bounds_and_order_are_values_within_their_domains(smo
     assert inside > 5
 
 
+def test_ends_that_do_not_belong_to_a_domain_are_not_reached():
+    law = SegmentedPolynomial([-1.0, -0.01], 0.2, [1.0] * 4, [1.0] * 2, [1.0] * 4, [1.0] * 2, [1.0] * 4)
+    coordinates = Coordinates(free_parameters(law, over=["compression_knots", "rebound_knot"]), "none")
+    lower, upper = (np.asarray(coordinates.to_physical(side)) for side in map(np.asarray, coordinates.bounds()))
+    assert np.all(upper[:2] < 0.0) and lower[2] > 0.0
+
+
 def test_rows_of_order_say_when_knots_meet():
     coordinates = Coordinates(free_parameters(PiecewiseLinear([-0.1, 0.2], [5.0, 6.0, 7.0]), over=["knots"]), "none")
     rows, gaps = coordinates.order()

@@ -1,6 +1,6 @@
 """Engines: what a caller chooses, which derivatives pass, and how vectors lie in memory."""
 
-from typing import Any, final
+from typing import Any, cast, final
 
 import diffrax
 import jax
@@ -11,6 +11,8 @@ import pytest
 from jaxdamp import Ride, configuration, dampers, metrics, roads, simulate, sweep
 from jaxdamp._vectors import MemoryLayout
 from jaxdamp.simulation import AbstractFixedStep, AbstractStepper, Adaptive, Equations, Exponential
+from jaxdamp.simulation.equations import RoadInput
+from jaxdamp.simulation.fixed_step import _over
 from jaxdamp.vehicles.presets import half_car_002, quarter_car_000
 
 
@@ -104,6 +106,23 @@ def test_engines_refuse_what_they_cannot_be():
         simulate(CAR, BUMP, duration=0.1, engine=Exponential(), method="diffrax")
     with pytest.raises(ValueError, match="`engine` must not be given on a white road"):
         Ride(CAR, roads.white("C", 20.0), engine=Exponential())
+
+
+class Seen:
+    """Steps that note the road, the last four of them."""
+
+    dt = np.asarray(1e-3)
+
+    def __call__(self, now, begin, end):
+        return jnp.concatenate([now[1:], jnp.stack([begin.height, end.height, begin.rate, end.rate])[None]])
+
+
+def test_the_road_and_its_rate_are_straight_over_the_steps_between_two_instants():
+    ends = np.array([0.02, -0.3]), np.array([0.05, 0.7])
+    begin, end = (RoadInput(*map(jnp.asarray, one)) for one in ends)
+    seen = cast(Any, _over)(Seen(), jnp.zeros((4, 4)), begin, end, 4)
+    height, rate = np.linspace(*ends, 5).T
+    np.testing.assert_allclose(seen, np.stack([height[:-1], height[1:], rate[:-1], rate[1:]], axis=1), rtol=1e-12)
 
 
 # ---- rides

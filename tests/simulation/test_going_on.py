@@ -49,6 +49,8 @@ def test_parts_of_other_steps_and_other_numbers_agree_as_well_as_the_steps_do():
     finer = simulate(LAG, ROAD, duration=0.1, dt=5e-4, state=state)
     assert float(finer.time[1]) == pytest.approx(0.1005, rel=1e-12)
     np.testing.assert_allclose(finer["stroke"][::2], whole[100:], atol=1e-3 * np.abs(whole).max())
+    finest = simulate(LAG, ROAD, duration=0.1, dt=5e-4, substeps=16, state=state).motion[1]  # by the ratio of the steps
+    np.testing.assert_allclose(finer.motion[1], finest, atol=1e-5 * np.abs(finest).max())
     stiffer = simulate(replace(LAG, {"damper.law.rate": 5000.0}), ROAD, duration=0.1, state=state)
     np.testing.assert_array_equal(stiffer.motion[0], state.now.motion)
     assert np.abs(stiffer["stroke"] - whole[100:]).max() > 0.1 * np.abs(whole).max()

@@ -63,6 +63,13 @@ def test_a_short_sweep_asks_for_no_other_program(program):
     assert sum(taken) == COUNT
 
 
+def test_points_that_follow_count_as_work_left(program):
+    (one, _), (two, by_two) = program(0.04), program(0.02)
+    runs = running.Runner(one, points({"x": np.arange(float(COUNT))}), lambda: two)
+    assert sum(len(indices) for indices, _ in runs.results(np.arange(100), later=COUNT - 100)) == 100
+    assert sum(by_two) > 0
+
+
 def test_a_loop_that_the_machine_does_not_load_is_left_to_xla_with_a_word(monkeypatch):
     def unloadable(*_):
         raise OSError("failed to map segment from shared object")

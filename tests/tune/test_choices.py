@@ -2,6 +2,7 @@
 
 import itertools
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -41,6 +42,18 @@ def test_what_is_free_beside_a_choice_is_best_for_it() -> None:
     best = points[allowed][np.argmin(swept[COMFORT].values.ravel()[allowed])]
     assert [values[name] for name in choices] == best[:2].tolist()
     assert found.after[COMFORT] <= swept[COMFORT].values.ravel()[allowed].min() * (1 + 1e-9)
+
+
+def test_a_combination_without_a_number_comes_last() -> None:
+    def steep(metrics):
+        return jnp.where(metrics[COMFORT] > 1.1, jnp.nan, metrics[COMFORT])
+
+    result = tune.minimise(steep, CAR, WHITE, over={"damper.rate": tune.Choice([1500.0, 3000.0, 4400.0])})
+    assert result.combinations is not None and float(get(result.vehicle, "damper.rate")) == 4400.0
+    assert result.combinations.choices["damper.rate"].tolist() == [4400.0, 3000.0, 1500.0]
+    assert result.combinations.met.tolist() == [True, True, False]
+    assert "is the best of 3 combinations, of which 1 without a number, beside" in result.summary
+    assert [row[-1] for row in result.combinations.table().rows] == ["met", "met", "no number"]
 
 
 def test_clicks_are_chosen_and_swept() -> None:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from jaxdamp import dampers, roads, tune
-from jaxdamp.tune import Outcome, Rescore, Status, TuneResult
+from jaxdamp.solve import SequentialQuadratic
+from jaxdamp.tune import Outcome, Rescore, Status, TuneResult, minimising
 from jaxdamp.tune.limits import limit_ranges
 from jaxdamp.tune.ranges import Change
 from jaxdamp.tune.verdict import decided, half_interval
@@ -154,6 +155,54 @@ def test_an_optimum_at_a_kink_is_an_optimum():
     assert left == pytest.approx(right, rel=1e-6) and result.converged and not result.warnings
     stopped = tune.minimise(worse, car, WHITE, bounds=bounds, max_steps=2)
     assert stopped.status is Status.STEP_LIMIT
+
+
+def test_a_search_that_ends_before_an_optimum_is_started_again(monkeypatch):
+    terminate, ended = SequentialQuadratic.terminate, []
+
+    def early(solver, state, promised):
+        if state.steps == 1 and not ended:
+            state.open = False
+            ended.append(state.y.copy())
+            return True
+        return terminate(solver, state, promised)
+
+    monkeypatch.setattr(SequentialQuadratic, "terminate", early)
+    result = tune.minimise(COMFORT, CAR, WHITE)
+    assert result.parameters[0].after == pytest.approx(4656.4, abs=0.05) and result.converged
+    assert len(ended) == 1 and len(result.history) > 2
+
+
+def judged_beyond(monkeypatch, limit: float, excess: list[float]) -> list[range]:
+    """Judgements on made-up roads, on which the tyre load is beyond a limit by these shares; the roads asked for."""
+    asked = []
+
+    def fresh(evaluator, sides, numbers, allowed):
+        asked.append(numbers)
+        units, start = evaluator.task.units, dict.fromkeys(evaluator.task.units, np.ones(3))
+        return Rescore(start, start | {TYRE: np.full(3, limit * (1.0 + excess[len(asked) - 1]))}, units, TYRE)
+
+    monkeypatch.setattr(minimising, "_on_fresh_roads", fresh)
+    return asked
+
+
+def test_a_limit_is_tightened_until_new_roads_keep_it(monkeypatch):
+    asked = judged_beyond(monkeypatch, 1.01, [0.03, 0.02, 0.0])
+    stiff = presets.quarter_car_000(dampers.Linear(12000.0))
+    result = tune.minimise("working_space_rms", stiff, WHITE, limits={TYRE: "+1%"}, fresh_roads=4)
+    assert asked == [range(4), range(4, 8), range(8, 12)]
+    assert result.after[TYRE] == pytest.approx(0.95 * 1.01 * result.before[TYRE], rel=1e-4)
+
+
+def test_combinations_are_those_of_the_tightened_limit(monkeypatch):
+    """The best with 1241 N, which 1242 N allow and 1.15 % less does not, comes after the next one with 1226 N."""
+    judged_beyond(monkeypatch, 1242.0, [0.0115, 0.0])
+    over = {"damper.rate": tune.Choice([1500.0, 4400.0, 5200.0])}
+    result = tune.minimise(COMFORT, CAR, WHITE, over=over, limits={TYRE: 1242.0})
+    combinations = result.combinations
+    assert combinations is not None and combinations.met.tolist() == [True, False, False]
+    assert combinations.choices["damper.rate"].tolist() == [5200.0, 4400.0, 1500.0]
+    assert result.parameters[0].after == 5200.0
 
 
 @pytest.mark.slow
