@@ -45,6 +45,7 @@ CALLS = {
     r"Freeze all but one of them, or add": "Fit a simpler law, or add",
     r"Freeze it or add records that excite it": "Fit a simpler law, or add records that excite it",
     r"Add records beyond it, or freeze it": "Add records beyond it",
+    r"such as knots, or take a law with fewer": "such as --freeze knots, or fit a simpler law",
     r"Try another start, bounds, or fewer free parameters": "Fit a simpler law",
     r"compare with `identify\.friction_ladder\(vehicle\)`": "compare the forms with --friction all",
     r"(try|such as) piecewise_linear or table": r"\1 --law piecewise_linear,table",

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.special
 from jaxtyping import Bool, Float
 
-from jaxdamp._triangles import determined, triangle, unit_columns
+from jaxdamp._triangles import determined, orthonormal, triangle, unit_columns
 from jaxdamp.dampers import Reach, laws_inside
 from jaxdamp.identify.criteria import Priors
 from jaxdamp.identify.estimates import WIDER, Estimate, Minimum
@@ -25,6 +25,7 @@ from jaxdamp.parameters import Coordinates, FreeParameters
 WEAK = 0.5  # standard error, relative to the value or to the force, above which a parameter is not identifiable
 BOUND_Z_SCORE = 3.0  # standard errors beyond an edge from which a parameter counts as limited by it
 NEARLY = 9.0  # largest increase in chi-square of another minimum that is reported: three standard errors
+OFF = 1.0  # standard errors from the minimum by the derivatives, beyond which a search has not ended there
 APART = 3.0  # standard errors beyond which a parameter of another minimum counts as different
 TAKES_PART = 0.1  # force of a parameter in a direction, relative to the largest, above which it belongs to it
 AT_LIMIT = 1e-4  # distance from a limit given by other parameters, relative to the start, that counts as zero
@@ -38,6 +39,7 @@ class Estimates(NamedTuple):
     minima: tuple[Minimum, ...]
     notes: tuple[str, ...]
     summary: tuple[str, ...]  # of the notes, with groups of numbers named once
+    unsettled: tuple[str, ...] = ()  # numbers that seem certain, but are not where the derivatives place the minimum
 
 
 def estimate(problem: Problem, solution: Solution, noise: Noise) -> Estimates:
@@ -84,7 +86,20 @@ def estimate(problem: Problem, solution: Solution, noise: Noise) -> Estimates:
     estimates, notes = on_identifiability(problem, found, estimates, directions)
     further = on_minima(minima, estimates) + on_reach(estimates, spans)
     summary = (*in_groups(estimates), *further)
-    return Estimates(estimates, uncertain.covariance, minima, (*notes, *further), summary)
+    sure = np.array([not e.note for e in estimates])
+    ended = found.converged and not solution.closed_form and not problem.is_rounding(found.squares)
+    off = sure & _off(found, noise, sides == 0) if ended else np.zeros_like(sure)
+    unsettled = tuple(np.array(free.names)[off])
+    return Estimates(estimates, uncertain.covariance, minima, (*notes, *further), summary, unsettled)
+
+
+def _off(found: SearchEnd, noise: Noise, inside: Bool[np.ndarray, " free"]) -> Bool[np.ndarray, " free"]:
+    """Which numbers are far from where the derivatives place the minimum. Those at ends of their ranges stay there."""
+    off, jacobian = np.zeros(inside.size, bool), found.jacobian[:, inside]
+    reachable = np.linalg.norm(orthonormal(jacobian).T @ found.residual)
+    if reachable > OFF * np.sqrt(noise.variance):  # no number is farther off than all together
+        off[inside] = np.abs(uncertainty(jacobian, found.residual, noise).unconstrained_step) > OFF
+    return off
 
 
 def undetermined(problem: Problem, found: SearchEnd) -> tuple[str, ...]:

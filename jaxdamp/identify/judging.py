@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
+from jaxdamp._status import Status
 from jaxdamp.bench import BenchRun, contradictions_in_words
 from jaxdamp.dampers import (
     AbstractDamper,
@@ -78,7 +79,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     law, rig = law_of(model), rig_of(model)
     fitted = np.isfinite(problem.sigma)
     percent, rmse, scores = score(models or model, problem.runs, fitted, problem.initial_state)
-    notes = on_status(best, _REMEDY)
+    notes = on_status(best, estimates.unsettled, _REMEDY)
     on_records = (*notes_on(model, problem.fitted_to), *off_span(model, problem.fitted_to, problem.initial_state))
     effects = left_out(problem, best)
     on_rest = on_misfit(noise, estimates.estimates, bool(effects))
@@ -86,7 +87,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     main = (*notes, *on_records, *effects, *gas, *estimates.summary, *on_rest)
     notes += [*on_records, *gas, *estimates.notes, *on_rest, *effects]
     return FitResult(
-        law=with_standard_errors(law, _errors_of_law(model, estimates.estimates)),
+        law=with_standard_errors(law, _errors_of_law(model, estimates)),
         runs=problem.runs,
         fit_percent=percent,
         rmse=rmse,
@@ -102,13 +103,14 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     )
 
 
-def _errors_of_law(model: Model, estimates: Sequence[Estimate]) -> list[StandardError]:
+def _errors_of_law(model: Model, estimates: Estimates) -> list[StandardError]:
     """The standard errors of the numbers of the law, named as in the law without its machine."""
     inside = "" if isinstance(model, AbstractDamper) else "law."
     return [
-        StandardError(e.name.removeprefix(inside), e.standard_error, e.unit, e.note != "not identifiable")
-        for e in estimates
+        StandardError(e.name.removeprefix(inside), e.standard_error, e.unit, e.note != "not identifiable" and settled)
+        for e in estimates.estimates
         if e.name.startswith(inside)
+        for settled in [e.name not in estimates.unsettled]
     ]
 
 
@@ -119,7 +121,7 @@ def fields_of_fit(problem: Problem, solution: Solution, noise: Noise, estimates:
         "parameters": estimates.estimates,
         "covariance": estimates.covariance,
         "minima": estimates.minima,
-        "status": best.status,
+        "status": Status.NO_BETTER_STEP if estimates.unsettled else best.status,
         "steps": best.steps,
         "starts": solution.starts,
         "inflation": noise.inflation,
@@ -127,9 +129,27 @@ def fields_of_fit(problem: Problem, solution: Solution, noise: Noise, estimates:
     }
 
 
-def on_status(best: SearchEnd, remedy: str = "") -> list[str]:
-    """A sentence on a search that did not converge."""
-    return [] if best.converged else [f"The search did not converge: {best.status.sentence} {remedy}".rstrip()]
+def on_status(best: SearchEnd, unsettled: Sequence[str], remedy: str = "") -> list[str]:
+    """A sentence on a search that did not converge.
+
+    Arguments:
+        best: where it ended.
+        unsettled: numbers that are not where the derivatives place the minimum, though the search found no better step.
+        remedy: what helps after too few steps.
+    """
+    if best.converged and not unsettled:
+        return []
+    if not unsettled:
+        more = "Allow more steps. " * (best.status is Status.STEP_LIMIT)
+        return [f"The search did not converge: {best.status.sentence} {more}{remedy}".rstrip()]
+    differ = "differs" if len(unsettled) == 1 else "differ"
+    who = ", ".join(unsettled[:3]) + f" and {len(unsettled) - 3} others" * (len(unsettled) > 3)
+    return [
+        f"The search did not converge: it ended where {who} {differ} by more than a standard error from the minimum "
+        "that the derivatives show, at a kink of the sum of squares, such as a knot at a sample, or by a loose "
+        "tolerance. Other values fit nearly as well. Freeze the numbers that place kinks, such as knots, or take a law "
+        "with fewer."
+    ]
 
 
 def fitted_models(problem: Problem, values: np.ndarray) -> tuple[list[Model], Model]:

@@ -75,16 +75,19 @@ def search_from(problem: Problem, *, starts: int | None, max_steps: int, solver:
         others = _not_among(tried, other_starts(problem.free, problem.reach))
         others = others[: None if starts is None else starts - len(tried)]
         tried, ends = [*tried, *others], [*ends, *_follow(problem, others, best, max_steps, solver)]
-        before = best
-        best = min(
-            (end for end in ends if end.finite),
-            key=lambda end: (1.0 + BETTER * (end is not before)) * end.squares,
-            default=before,
-        )
+        before, end = best, _least(ends, best)
+        best = end if end is before else _to_its_end(problem, end, max_steps, solver)
+        ends = [best if one is end else one for one in ends]
         if before.finite and best.squares >= (1.0 - WORTH_A_ROUND) * before.squares:
             break
         problem = problem.started_at(best.values)
     return Solution(best, tuple(end for end in ends if end.finite and (end.converged or end is best)), len(tried))
+
+
+def _least(ends: Sequence[SearchEnd], before: SearchEnd) -> SearchEnd:
+    """The end with the least sum of squares; the one before where no other is better."""
+    finite = (end for end in ends if end.finite)
+    return min(finite, key=lambda end: (1.0 + BETTER * (end is not before)) * end.squares, default=before)
 
 
 def _not_among(tried: Sequence[np.ndarray], others: Sequence[np.ndarray]) -> list[np.ndarray]:
@@ -131,10 +134,17 @@ def _follow(
     promising = sorted(open_ended, key=lambda end: end.squares)
     ends = [end for end in looks if end.converged]
     for look in promising[:FOLLOWED]:
-        left = min(max_steps - look.steps, FOLLOWED_STEPS)
-        on = search(problem.started_at(look.values), left, solver=solver) if left else look._replace(steps=0)
-        ends.append(on._replace(steps=look.steps + on.steps))
+        ends.append(_to_its_end(problem, look, min(max_steps, look.steps + FOLLOWED_STEPS), solver))
     return ends
+
+
+def _to_its_end(problem: Problem, end: SearchEnd, max_steps: int, solver: Solver | None) -> SearchEnd:
+    """The end of a search that was followed for fewer steps than it may take."""
+    left = max_steps - end.steps
+    if end.converged or left < 1:
+        return end
+    on = search(problem.started_at(end.values), left, solver=solver)
+    return on._replace(steps=end.steps + on.steps)
 
 
 def minima_of(solution: Solution, names: Sequence[str], variance: float) -> tuple[Minimum, ...]:

@@ -216,7 +216,10 @@ def _judged(
     reached = np.asarray(residuals.wanted) + deviations * np.asarray(residuals.tolerance)
     met = tuple(Met(name, *goals[name], float(value)) for name, value in zip(goals, reached, strict=True))
     estimates = estimate(problem, solution, noise)
-    notes = [*on_status(end), *(f"{e.name} = {e.value:.4g} is {e.note}." for e in estimates.estimates if e.note)]
+    notes = [
+        *on_status(end, estimates.unsettled),
+        *(f"{e.name} = {e.value:.4g} is {e.note}." for e in estimates.estimates if e.note),
+    ]
     notes += [
         f"{t.name} is missed: {t.value:.4g} instead of {plus_minus(t.target, t.tolerance)}." for t in met if not t.met
     ]

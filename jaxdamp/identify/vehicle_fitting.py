@@ -256,7 +256,7 @@ def _judged(
     model = mean_over_records(model, data.per_record)
     scores = channel_scores(problem, end.residual, data.rides)
     signs = [*on_signs(scores, at_start), *on_units(at_start, model.sensors)]
-    notes = [*on_status(end), *refused, *on_free_scale(scale, model), *signs, *estimates.notes]
+    notes = [*on_status(end, estimates.unsettled), *refused, *on_free_scale(scale, model), *signs, *estimates.notes]
     if not signs:  # what such a channel looks like is no lag of a sensor, and what friction looks like neither
         friction = friction_left_out(problem, end) if noise.inflation > 1.0 else None
         notes += [friction.sentence] if friction else []

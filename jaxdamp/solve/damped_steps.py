@@ -19,7 +19,7 @@ EachLane: TypeAlias = Float[AnyArray, "*lanes"]
 LaneMask: TypeAlias = Bool[AnyArray, "*lanes"]
 Unknowns: TypeAlias = Float[AnyArray, "*lanes unknowns"]
 Triangles: TypeAlias = Float[AnyArray, "*lanes columns columns"]
-_Carry: TypeAlias = tuple[AnyArray, AnyArray, AnyArray, AnyArray | np.bool_]
+_Carry: TypeAlias = tuple[AnyArray, AnyArray, AnyArray, AnyArray | np.bool_, AnyArray | int]
 Flat = TypeVar("Flat", Array, np.ndarray)
 Tree = TypeVar("Tree")
 
@@ -32,8 +32,15 @@ LARGEST_STEP_SIZE = FIRST_DAMPING / LEAST_DAMPING
 MOST_OF_THE_WAY = 0.9  # to an edge, in one step
 NEAR = 1e-3  # coordinates so near an edge may go all the way
 AT_EDGE = 1e-6  # coordinates so near their lower bound end on it; also the distance to conditions
-FIRM = 1e6  # weight of a limit of several coordinates, relative to the data's
+FIRM = 1e4  # weight of a limit of several coordinates, relative to the data; its square times rounding errors is small
 ROUNDING = 500.0  # rounding errors of a sum of squares, in those of one number
+SLACK = 1e-9  # beyond a limit, that is a rounding error: a limit of one coordinate may stand twice
+WORTH = 0.1  # standard errors: a decrease that counts, where the damping begins anew
+LEAST_SCALE = 1e-2  # of that before, where the damping begins anew: what the data hardly show would run away
+PATIENCE = 30  # points tried without one
+KINK = 0.01  # standard errors: a refused step that is predicted to gain less will only become shorter
+TOGETHER = 5  # solutions of one step, after which one limit at a time is exchanged, which ends
+MOST_SOLUTIONS = 30  # after which no coordinate leaves its limit any more
 
 
 class Linearisation(NamedTuple):
@@ -69,7 +76,9 @@ class State(NamedTuple):
     steps: Int[AnyArray, "*lanes"]  # points tried
     converged: LaneMask  # whether the search has ended by its tolerance
     stuck: LaneMask  # whether there is no further step
-    idle: Int[AnyArray, "*lanes"]  # points tried in a row without a decrease that counts
+    since: EachLane  # half the sum of squares at the last decrease that counts
+    idle: Int[AnyArray, "*lanes"]  # points tried since
+    improved: LaneMask  # whether there was one since the damping began, first or anew
     aux: PyTree  # what the residual gives beside its value at the accepted point
 
 
@@ -121,20 +130,35 @@ def judged(xp: ModuleType, rules: Rules, state: State, here: Linearisation, aux:
     room = here.margins / length - AT_EDGE
     changed = {
         "triangle": tried,
-        "scale": xp.maximum(state.scale, xp.sqrt(xp.sum(tried[..., :-1] ** 2, axis=-2))),
+        "scale": xp.maximum(state.scale, _norms(xp, tried)),
         "conditions": here.margin_slopes / length[..., None],
         "least": -xp.where(room > NEAR, MOST_OF_THE_WAY * room, room),
         "aux": aux,
     }
     chosen = {name: where(xp, accepted, value, getattr(state, name)) for name, value in changed.items()}
     step_size = xp.where(first, state.step_size, state.step_size / divisor)
-    converged = ~first & (negligible | state.short)
-    gained = first | (accepted & (old - new >= state.floor))
-    idle = xp.where(gained, 0, state.idle + 1)
-    if rules.patience is not None:
-        converged = converged | (idle >= rules.patience) | (state.whole & ~gained)
-    counts = {"steps": state.steps + 1, "idle": idle}
-    return accepted, state._replace(step_size=step_size, converged=converged, **counts, **chosen)
+    now, patience = _half_squares(chosen["triangle"]), rules.patience
+    worth = state.floor if patience is not None else xp.maximum(state.floor, WORTH**2 / here.samples * now)
+    gained = state.since - now >= worth
+    idle, improved = xp.where(first | gained, 0, state.idle + 1), ~first & (state.improved | gained)
+    blocked = state.short | ~accepted & (state.predicted < KINK**2 / here.samples * now)
+    if patience is not None:
+        ends = state.short | (idle >= patience) | (state.whole & ~gained)
+        anew = xp.zeros_like(ends)
+    else:
+        ends = blocked | (idle >= PATIENCE)
+        anew = ~first & ~negligible & ends & improved
+    afresh = xp.maximum(_norms(xp, chosen["triangle"]), LEAST_SCALE * chosen["scale"])
+    chosen["scale"] = xp.where(anew[..., None], afresh, chosen["scale"])
+    changes = {
+        "step_size": xp.where(anew, 1.0, step_size),
+        "converged": ~first & (negligible | ends) & ~anew,
+        "steps": state.steps + 1,
+        "since": xp.where(first | gained, now, state.since),
+        "idle": xp.where(anew, 0, idle),
+        "improved": improved & ~anew,
+    }
+    return accepted, state._replace(**changes, **chosen)
 
 
 def with_proposal(
@@ -212,6 +236,11 @@ def _triangle(xp: ModuleType, rows: Float[AnyArray, "*lanes rows columns"]) -> T
     return xp.linalg.qr(rows, mode="r")
 
 
+def _norms(xp: ModuleType, triangle: Triangles) -> Unknowns:
+    """Of the columns of the Jacobian."""
+    return xp.sqrt(xp.sum(triangle[..., :-1] ** 2, axis=-2))
+
+
 def _half_squares(triangle: Triangles) -> EachLane:
     return 0.5 * (triangle[..., -1] ** 2).sum(axis=-1)
 
@@ -237,8 +266,10 @@ def _damped_step(
 ) -> Unknowns:
     """Min ‖R d + q‖² + ‖D d‖² λ/step_size within limits of d and of C d; NaN where there is none.
 
-    A coordinate that would leave its limits is put on the nearer one, and the rest is solved again. Limits of C d
-    are rows of a great weight.
+    A coordinate that would leave its limits is put on the nearer one, one on a limit that the sum of squares pulls
+    inside is set free, and the rest is solved again (block pivoting). Limits of C d are rows of a great weight.
+
+    Source: L. F. Portugal, J. J. Júdice, L. N. Vicente, Mathematics of Computation 63, 1994.
     """
     n = state.scale.shape[-1]
     r, q, conditions = state.triangle[..., :n, :n], state.triangle[..., :n, n], state.conditions
@@ -248,6 +279,8 @@ def _damped_step(
     firm = FIRM * xp.maximum(xp.max(scale, axis=-1), 1.0)[..., None]
     low = xp.concatenate([xp.broadcast_to(lower, scale.shape), state.least], axis=-1)
     high = xp.concatenate([xp.broadcast_to(upper, scale.shape), xp.full_like(state.least, np.inf)], axis=-1)
+
+    slack = SLACK * xp.where(xp.isfinite(low), 1.0 + xp.abs(low), 1.0)
 
     def solved(held: AnyArray, at: AnyArray) -> AnyArray:
         coordinates, rows, values = held[..., :n], held[..., n:], xp.where(held[..., :n], at[..., :n], 0.0)
@@ -262,14 +295,26 @@ def _damped_step(
         reduced = xp.linalg.qr(xp.concatenate([matrix, target[..., None]], axis=-1), mode="r")
         return _back_substituted(xp, reduced[..., :n, :n], reduced[..., :n, n])
 
+    def pulled_inside(held: AnyArray, at: AnyArray, step: AnyArray) -> AnyArray:
+        if xp is np and not np.any(held):
+            return held
+        beyond = xp.where(held[..., n:], _times(conditions, step) - at[..., n:], 0.0)
+        pull = (_times(r, step) + q)[..., None, :] @ r + (firm**2 * beyond)[..., None, :] @ conditions
+        pull = xp.concatenate([pull[..., 0, :] + damping**2 * step, -beyond], axis=-1)
+        return held & (low < high) & ((at == low) & (pull < 0) | (at == high) & (pull > 0))
+
     def body(carry: _Carry) -> _Carry:
-        held, at, _, _ = carry
+        held, at, _, _, solutions = carry
         step = solved(held, at)
         both = xp.concatenate([step, _times(conditions, step)], axis=-1)
-        outside = ~held & ((both < low) | (both > high))
-        return held | outside, xp.where(outside, xp.clip(both, low, high), at), step, xp.any(outside)
+        outside = ~held & ((both < low - slack) | (both > high + slack))
+        change = outside | pulled_inside(held, at, step)
+        last = change & (xp.cumsum(change[..., ::-1], axis=-1)[..., ::-1] == 1)
+        change = xp.where(solutions < TOGETHER, change, xp.where(solutions < MOST_SOLUTIONS, last, outside))
+        at = xp.where(outside, xp.clip(both, low, high), at)
+        return held ^ change, at, step, xp.any(change), solutions + 1
 
-    begin = (xp.zeros(low.shape, bool), xp.zeros(low.shape, low.dtype), xp.zeros_like(scale), xp.asarray(True))
+    begin = (xp.zeros(low.shape, bool), xp.zeros(low.shape, low.dtype), xp.zeros_like(scale), xp.asarray(True), 0)
     return xp.clip(_while(xp, lambda carry: carry[3], body, begin)[2], lower, upper)
 
 

@@ -39,14 +39,16 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
     Nielsen's rule for the damping 1/step_size, by the ratio of actual to predicted decrease. A step whose predicted
     decrease is less than `tolerance` standard errors, or below rounding errors, is accepted and ends the search; if
     refused, it would only become shorter and shorter. A step shorter than `rtol` and `atol` also ends the search: kinks
-    of a residual are kinks of the sum of squares, near which the predicted decrease is wrong. A step that violates a
-    condition is refused. The damping holds back what the data hardly determine, so that a step is small far from the
-    minimum too: before the search ends by a small step, the whole step, without damping, is tried, and if it is
-    refused, the most damped one that is not small.
+    of a residual are kinks of the sum of squares, near which the predicted decrease is wrong. There, and after thirty
+    points that gained less than a tenth of a standard error, the damping begins anew, until that gains no more. A step
+    that violates a condition is refused. The damping holds back what the data hardly determine, so that a step is small
+    far from the minimum too: before the search ends by a small step, the whole step, without damping, is tried, and if
+    it is refused, the most damped one that is not small.
 
     Towards an edge that is not near, a step goes at most nine tenths of the way, since many models degenerate at their
-    edges. Conditions are edges too, linearised at each accepted point. A step is solved by orthogonal triangles, so
-    that unknowns which the data hardly tell apart lose no digits to products of the Jacobian.
+    edges. Conditions are edges too, linearised at each accepted point. A step is the best within these limits, by block
+    pivoting, solved by orthogonal triangles, so that unknowns which the data hardly tell apart lose no digits to
+    products of the Jacobian.
 
     Unknowns should be numbers of order one, as those of `jaxdamp.parameters.Coordinates` are. For use by
     `optimistix.least_squares`, under `jax.jit`, `jax.vmap` and derivatives; `adjoint=ImplicitWithinBounds()` gives
@@ -123,7 +125,9 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
             steps=xp.zeros(lanes, int),
             converged=no,
             stuck=no,
+            since=zeros,
             idle=xp.zeros(lanes, int),
+            improved=no,
             aux=aux,
         )
 

@@ -9,7 +9,7 @@ from jaxdamp.dampers import Besinger, Bilinear, BoucWen, Lag, Linear, PiecewiseL
 from jaxdamp.dampers.base import Reach
 from jaxdamp.dampers.inside import margins
 from jaxdamp.export import from_json, to_json
-from jaxdamp.identify import fit
+from jaxdamp.identify import fit, several
 from jaxdamp.identify.several import other_starts
 from jaxdamp.parameters import free_parameters
 
@@ -62,6 +62,13 @@ def test_a_bad_instance_ends_where_the_truth_does(first_records):
     assert few.starts == 2
     with pytest.raises(ValueError, match="`starts` must be 1 or more"):
         fit(BAD, first_records, starts=0)
+
+
+def test_the_best_of_several_starts_is_followed_to_its_end(monkeypatch):
+    monkeypatch.setattr(several, "FIRST_LOOK", 3)
+    monkeypatch.setattr(several, "FOLLOWED_STEPS", 1)
+    result = fit(BAD, records(3))
+    assert result.converged and np.all(np.abs(errors(result, PUBLISHED)) < 3.0)
 
 
 @pytest.mark.parametrize("seed", [3, 30])

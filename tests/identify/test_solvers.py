@@ -1,5 +1,6 @@
 """Fits by any solver of optimistix, and a problem as a function in a JAX program."""
 
+import dataclasses
 from typing import Any
 
 import jax
@@ -35,6 +36,18 @@ def test_a_law_with_conditions_by_another_solver(sines, solver):
     assert other.warnings == usual.warnings
     errors = np.sqrt(np.diag(usual.covariance))
     np.testing.assert_allclose((other.covariance - usual.covariance) / np.outer(errors, errors), 0.0, atol=1e-4)
+
+
+def test_an_end_far_from_the_minimum_is_said(sines):
+    """The solver calls itself successful after a first small step."""
+    runs = sines(BESINGER, noise=20.0)
+    found = identify.fit(AWAY, runs, starts=1)
+    error = found["rebound_rate"].standard_error
+    near = dataclasses.replace(BESINGER, rebound_rate=float(found.law.rebound_rate) + 6.0 * error)
+    early = identify.fit(near, runs, solver=optx.Dogleg(rtol=0.5, atol=0.5), starts=1, force_noise=20.0)
+    assert apart(found, early) > 1.0
+    assert early.status is identify.Status.NO_BETTER_STEP and "rebound_rate" in early.warnings[0]
+    assert not all(e.identified for e in early.law.standard_errors)
 
 
 def test_orders_and_bounds_hold_by_construction(sines):

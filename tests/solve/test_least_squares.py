@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 import pytest
+from scipy.optimize import lsq_linear
 
 from jaxdamp._status import Status
 from jaxdamp.solve import BoundedLevenbergMarquardt, ImplicitWithinBounds, Linearisation, least_squares_on_host
@@ -79,6 +80,49 @@ def test_a_condition_that_bends_within_a_step_is_kept():
         misses, BoundedLevenbergMarquardt(lower=0.0, upper=10.0, conditions=allowed), jnp.ones(2), DATA
     )
     np.testing.assert_allclose(inside.value, ends[-1].y[0], rtol=1e-6)
+
+
+def searched(model, start, solver, data):
+    """The end of a search of a NumPy function that gives forces and derivatives."""
+
+    def at(y, lanes):
+        force, slopes = model(y[0])
+        rows = np.concatenate([slopes, (force - data)[:, None]], axis=1) / np.linalg.norm(data)
+        return Linearisation(rows[None], np.zeros((1, 0)), np.zeros((1, 0, y.shape[1])), np.array([len(data)])), y
+
+    end = least_squares_on_host(at, solver, np.asarray(start)[None], 300)
+    assert end.status == [Status.CONVERGED]
+    return end.y[0], int(end.steps[0]), float(np.sum((model(end.y[0])[0] - data) ** 2))
+
+
+def test_unknowns_leave_bounds_again_within_a_step():
+    """A linear problem whose columns are nearly alike: most unknowns are at bounds, but not those hit first."""
+    random, count = np.random.default_rng(3), 10
+    alike = np.linalg.cholesky(0.98 * np.ones((count, count)) + 0.02 * np.eye(count)).T
+    columns = random.standard_normal((40, count)) @ alike
+    data = columns @ random.uniform(-1.0, 1.0, count) + 0.1 * random.standard_normal(40)
+    solver = BoundedLevenbergMarquardt(lower=np.full(count, -0.4), upper=np.full(count, 0.4))
+    found, steps, _ = searched(lambda y: (columns @ y, columns), np.zeros(count), solver, data)
+    np.testing.assert_allclose(found, lsq_linear(columns, data, (-0.4, 0.4), method="bvls").x, atol=1e-6)
+    assert steps < 10
+
+
+def test_a_search_ends_at_a_kink_only_where_none_from_there_gains():
+    """Straight lines between knots, which stand at samples: a knot that crosses one changes the derivatives."""
+    random = np.random.default_rng(11)
+    v = np.sort(np.round(random.uniform(-1.0, 1.0, 60), 2))
+    data = 3.0 * np.tanh(3.0 * v) + 0.1 * random.standard_normal(60)
+
+    def lines(y):
+        knots, slopes = y[:3], y[4:7]
+        above = np.maximum(v[:, None] - knots, 0.0)
+        columns = [np.where(above > 0.0, -slopes, 0.0), v[:, None], above, np.ones((60, 1))]
+        return y[3] * v + above @ slopes + y[7], np.concatenate(columns, axis=1)
+
+    solver = BoundedLevenbergMarquardt()
+    found, _, squares = searched(lines, [-0.5, 0.0, 0.5, 2.0, 0.3, 0.3, 0.3, 0.0], solver, data)
+    *_, least = searched(lines, found, solver, data)
+    assert squares - least < 0.01 * squares / 60  # a tenth of a standard error
 
 
 def test_the_gradient_of_a_solution_is_that_of_differences():
