@@ -187,14 +187,11 @@ class _Sums:
 
 def _chain(target: Variable, terms: list[tuple[bool, Atom]]) -> list[Define]:
     """A sum, term by term from the first that is not subtracted."""
-    start = next((i for i, (minus, _) in enumerate(terms) if not minus), 0)
-    (minus, total), *others = terms[start], *terms[:start], *terms[start + 1 :]
+    start = next(i for i, (minus, _) in enumerate(terms) if not minus)  # there is one, as the first of a sum is
+    total, others = terms[start][1], [*terms[:start], *terms[start + 1 :]]
     chain = []
     for i, (less, atom) in enumerate(others):
         to = target if i == len(others) - 1 else Variable(f"{target.name}_{i}", target.dtype)
-        if minus:  # all are
-            chain.append(Define(Variable(f"{target.name}_start", target.dtype), "neg", (total,)))
-            total, minus = chain[-1].target, False
         chain.append(Define(to, "sub" if less else "add", (total, atom)))
         total = to
     return chain

@@ -135,7 +135,7 @@ class AbstractEngine(AbstractLawEngine):
         """Whether the loop is printed as C and compiled by the machine's C compiler, for many cars side by side."""
         return False
 
-    def printed_if_faster(self) -> "AbstractEngine | None":
+    def printed_in_sweeps(self) -> "AbstractEngine | None":
         """The engine of a sweep without derivatives, whose loop may be printed; None if it stays this one."""
         return None
 

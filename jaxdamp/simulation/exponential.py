@@ -240,7 +240,7 @@ class Exponential(AbstractFixedStep):
         """As asked for."""
         return bool(self.printed)
 
-    def printed_if_faster(self) -> "Exponential | None":
+    def printed_in_sweeps(self) -> "Exponential | None":
         """Printed, if nobody has said."""
         return dataclasses.replace(self, printed=True) if self.printed is None else None
 

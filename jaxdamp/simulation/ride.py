@@ -188,7 +188,7 @@ class Ride(eqx.Module):
 
         A `sweep` without derivatives runs this form; one that takes long compares it with that of XLA.
         """
-        engine = self.engine.printed_if_faster()
+        engine = self.engine.printed_in_sweeps()
         if engine is None or self.heights is None or self.heights.dtype != jnp.float64 or compiler() is None:
             return None
         return eqx.tree_at(lambda ride: ride.engine, self, engine).side_by_side()
