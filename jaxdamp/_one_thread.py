@@ -1,10 +1,11 @@
-"""One thread for NumPy's linear algebra while a fit runs, or records are looked over.
+"""One thread for NumPy's linear algebra while a fit or a tuning runs, or records are looked over.
 
 The matrices are small or narrow. Several threads win nothing on them, and on a busy machine they wait for one another a
 hundred times longer than the work takes.
 """
 
 import functools
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,8 +17,10 @@ _open: list[Any] = []  # one entry for each fit that runs, the first with the li
 
 
 @functools.cache
-def _controller() -> Any:
-    from threadpoolctl import ThreadpoolController  # looks up the loaded libraries, once
+def _controller(of_scipy: bool) -> Any:
+    """Of the libraries that are loaded: NumPy's, and from its first use on SciPy's own."""
+    del of_scipy
+    from threadpoolctl import ThreadpoolController  # looks them up, once
 
     return ThreadpoolController()
 
@@ -36,7 +39,8 @@ def one_thread() -> Iterator[None]:
     with _lock:
         if not _open:
             _any_thread_may_set()
-        _open.append(_controller().limit(limits=1, user_api="blas") if not _open else None)
+        controller = _controller("scipy.linalg" in sys.modules)
+        _open.append(controller.limit(limits=1, user_api="blas") if not _open else None)
     try:
         yield
     finally:

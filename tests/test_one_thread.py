@@ -1,14 +1,19 @@
 """The linear algebra of a fit runs in one thread, and the limit is lifted afterwards, whatever the order."""
 
+import os
+import subprocess
+import sys
 import threading
 
 import numpy as np
 import pytest
+import scipy.linalg
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from jaxdamp import bench
 from jaxdamp._one_thread import one_thread
 from jaxdamp.bench import velocity
+from jaxdamp.solve import Evaluation, Region, Scaling, SequentialQuadratic
 
 
 def threads() -> set[int]:
@@ -18,6 +23,7 @@ def threads() -> set[int]:
 @pytest.fixture(autouse=True)
 def two_threads():
     np.linalg.qr(np.eye(3))
+    scipy.linalg.qr(np.eye(3))
     with threadpool_limits(2, "blas"):
         yield
 
@@ -65,3 +71,32 @@ def test_velocities_of_records_are_found_in_one(monkeypatch: pytest.MonkeyPatch)
     time = np.linspace(0.0, 4.0, 401)
     bench.estimate_velocity(time, np.sin(6.0 * time))
     assert seen and set.union(*seen) == {1} and threads() == {2}
+
+
+def test_libraries_that_are_loaded_later_are_limited_too() -> None:
+    """SciPy has a library of its own, which `import jax` does not load."""
+    script = (
+        "from jaxdamp._one_thread import one_thread\n"
+        "import numpy as np\n"
+        "with one_thread(): np.eye(2) @ np.eye(2)\n"
+        "import scipy.linalg\n"
+        "from threadpoolctl import threadpool_info\n"
+        "with one_thread(): inside = [pool['num_threads'] for pool in threadpool_info()]\n"
+        "assert set(inside) == {1}, inside\n"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True, env=os.environ | {"OPENBLAS_NUM_THREADS": "2"})
+
+
+def test_the_steps_of_a_tuning_take_one_thread() -> None:
+    """With several, a step of fifteen numbers took a quarter of a second on a busy machine."""
+    seen: list[set[int]] = []
+
+    def evaluate(points: np.ndarray) -> list[Evaluation]:
+        seen.append(threads())
+        return [Evaluation(y, np.array([y @ y]), 2.0 * y[None]) for y in points]
+
+    region = Region(np.full(2, -2.0), np.full(2, 2.0), np.zeros((0, 2)), np.zeros(0))
+    solver = SequentialQuadratic(region, Scaling(np.zeros(1), np.ones(1), 1), max_steps=3, improvement=1e-12)
+    start = np.ones(2)
+    solver.solve(evaluate, [solver.init(np.zeros(1), start, evaluate(start[None])[0])])
+    assert seen[0] == {2} and seen[1:] and all(each == {1} for each in seen[1:]) and threads() == {2}

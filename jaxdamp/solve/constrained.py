@@ -7,6 +7,8 @@ from typing import NamedTuple, final
 import numpy as np
 from jaxtyping import Bool, Float
 
+from jaxdamp._one_thread import one_thread
+
 
 RADIUS = 0.5  # largest change of a coordinate in the first step; coordinates are one at the start
 LEAST_RADIUS = 1e-6
@@ -189,6 +191,12 @@ class SequentialQuadratic:
             evaluate: as in `solve`.
             states: as in `solve`.
         """
+        import scipy.optimize  # noqa: F401 - before its linear algebra is limited
+
+        with one_thread():
+            return self._step(evaluate, states)
+
+    def _step(self, evaluate: Evaluate, states: Sequence[SearchState]) -> bool:
         tried = []
         for state in states:
             if state.open:
