@@ -82,7 +82,7 @@ def chain_report(
         ],
     )
     part = FitPart(comparison, runs, sheets, evaluation, preflight, remarks, baseline)
-    report.include(part.drawn(report.attempts) if laws is None else laws())
+    report.include(part.drawn(report.attempts, None if folder is None else {}) if laws is None else laws())
     if sheets:
         _add_ride_sheet(report, rides, tuned)
     for number, (road, ride) in enumerate(rides.items(), 1):
@@ -112,13 +112,14 @@ class FitPart(NamedTuple):
     remarks: Sequence[str] = ()
     baseline: AbstractDamper | None = None
 
-    def drawn(self, attempts: Attempts | None = None) -> Report:
+    def drawn(self, attempts: Attempts | None = None, files: dict[str, bytes] | None = None) -> Report:
         """Its sheet and sections.
 
         Arguments:
             attempts: collects parts that fail.
+            files: takes the pictures as files, for a page with a folder.
         """
-        part, comparison, baseline = Report("", {}, attempts), self.comparison, self.baseline
+        part, comparison, baseline = Report("", files, attempts), self.comparison, self.baseline
         if self.sheets:
             part.sheet(lambda: comparison.plot("sheet", baseline=baseline), comparison.verdict[0], "damper_sheet")
         records = (*comparison.best.result.runs, *comparison.held_out) if self.runs is None else tuple(self.runs)
@@ -129,7 +130,7 @@ class FitPart(NamedTuple):
         return part
 
     def begun(self, attempts: Attempts | None = None) -> Callable[[], Report]:
-        """The same, drawn by another process from now on; where there is none, when it is asked for.
+        """The same with files, drawn by another process from now on; where there is none, when it is asked for.
 
         Arguments:
             attempts: as in `drawn`, one that can be pickled.
@@ -140,7 +141,7 @@ class FitPart(NamedTuple):
 
 def _shown(shown: Display, part: FitPart, attempts: Attempts | None) -> Report:
     with shown_in(shown):
-        return part.drawn(attempts)
+        return part.drawn(attempts, {})
 
 
 def _add_ride_sheet(report: Report, rides: Mapping[str, Mapping[str, Response]], tuned: TuneResult | None) -> None:

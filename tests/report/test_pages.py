@@ -118,7 +118,7 @@ def test_a_page_on_the_whole_chain(comparison: Comparison, rides: dict[str, Resp
     evaluation, found = bench.evaluate(runs), bench.preflight(runs)
     page = chain_report(comparison, {"a bump": rides}, tuned, evaluation=evaluation, preflight=found)
     html = page.to_html()
-    assert not page.attempts.troubles
+    assert not page.attempts.troubles and "damper_sheet.pdf" not in html
     verdict = html.partition('<div class="verdict">')[2].partition("</div>")[0]
     for sentence in (found.summary, *comparison.verdict, *ride_verdict(rides), tuned.verdict.sentence, tuned.ending):
         assert first_upper(said(sentence)) in verdict
