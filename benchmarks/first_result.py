@@ -44,9 +44,9 @@ print(identify.fit(law, runs).rmse)
 BASE = "import jax; jax.jit(lambda x: x * x)(1.0)"
 COMMAND = """
 import sys
-from jaxdamp.cli import app
+from jaxdamp.cli import main
 sys.argv[:] = ["jaxdamp", *{words!r}]
-app()
+main()
 """
 COUNTED = """
 import atexit, sys
