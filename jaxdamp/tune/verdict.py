@@ -210,7 +210,7 @@ def bound_notes(space: SearchRange, changes: tuple[Change, ...]) -> list[str]:
         reason = {
             "default": f"by default 1/{FACTOR:g} of the start or {FACTOR:g} times it; other bounds: {widen}",
             "given": "as given",
-            "domain": "the end of the values it may take",
+            "domain": f"the end of the values {'they' if len(group) > 1 else 'it'} may take",
         }[origin]
         notes.append(f"{'; '.join(ends)} ({reason}). A better value may be beyond.")
     return notes
