@@ -138,6 +138,15 @@ def of_known_numbers(function: Function) -> Function:
     return cast(Function, call)
 
 
+def equal(one: PyTree, other: PyTree) -> bool:
+    """Whether two trees of known numbers are equal; on arrays of JAX each shape compared is a program."""
+
+    def plain(tree: PyTree) -> PyTree:
+        return jax.tree.map(lambda leaf: np.asarray(leaf) if eqx.is_array(leaf) else leaf, tree)
+
+    return bool(eqx.tree_equal(plain(one), plain(other)))
+
+
 def depends(function: Callable[[PyTree], PyTree], values: PyTree) -> bool:
     """Whether the result of a function depends on its argument; a call inside counts as depending on all of its inputs.
 

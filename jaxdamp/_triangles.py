@@ -13,14 +13,37 @@ RANK_TOLERANCE_SINGLE = 1e-4  # the same in single precision
 _ROWS = 512  # of a block: small enough for the cache
 
 
+_INDEPENDENT = 1e-3  # part of each column, relative to it, that those before leave, where products are precise enough
+
+
 def triangle(tall: PyTree) -> PyTree:
-    """R of the QR decomposition of a matrix with many rows, NumPy's or JAX's, block by block: ten times faster."""
+    """R of the QR decomposition of a matrix with many rows, NumPy's or JAX's, but for the signs of its rows.
+
+    By the products of the columns, in a tenth of the time, where these are far from depending on each other, so that
+    R is precise to 1e-9; else block by block.
+    """
     xp: Any = jnp if isinstance(tall, jax.Array) else np
     rows, columns = tall.shape
+    by_products = None if isinstance(tall, jax.Array) else _by_products(tall)
+    if by_products is not None:
+        return by_products
     if rows > 4 * _ROWS and columns < _ROWS // 4:
         padded = xp.concatenate([tall, xp.zeros((-rows % _ROWS, columns), tall.dtype)])
         tall = xp.reshape(xp.linalg.qr(xp.reshape(padded, (-1, _ROWS, columns)), mode="r"), (-1, columns))
     return xp.linalg.qr(tall, mode="r")
+
+
+def _by_products(tall: Float[np.ndarray, "rows columns"]) -> Float[np.ndarray, "columns columns"] | None:
+    """The triangle by Cholesky; None where the rounding of the products would be seen."""
+    products = tall.T @ tall
+    norms = np.sqrt(np.diagonal(products))
+    if tall.dtype != np.float64 or len(tall) < 2 * len(norms) or not (norms > 0.0).all():
+        return None
+    try:
+        unit = np.linalg.cholesky(products / norms / norms[:, None])
+    except np.linalg.LinAlgError:
+        return None
+    return unit.T * norms if np.diagonal(unit).min() > _INDEPENDENT else None
 
 
 def rows_of_products(

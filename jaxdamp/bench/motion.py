@@ -88,9 +88,7 @@ def motion_amplitude(time: Samples, stroke: Samples, frequency: float) -> float:
     window = round((len(time) - 1) / (time[-1] - time[0]) / frequency / 20)
     window = min(window, len(stroke) - 1) // 2 * 2 + 1
     if window > 5:
-        from scipy.signal import savgol_filter  # takes a second to import, and not every record needs it
-
-        stroke = np.asarray(savgol_filter(stroke, window, 4))
+        stroke = savitzky_golay(stroke, window, 4)
     return float(np.max(stroke) - np.min(stroke)) / 2
 
 
@@ -130,3 +128,31 @@ def white_noise(values: Samples) -> float:
     """
     differences = np.diff(values, 3)
     return float(np.median(np.abs(differences)) / (0.6745 * np.sqrt(20.0)))
+
+
+def savitzky_golay_weights(half: int, order: int, derivative: int) -> Float[np.ndarray, "samples columns"]:
+    """Of 2 half + 1 neighbouring samples, in the coefficients of the least-squares polynomial around the middle one.
+
+    Arguments:
+        half: samples to either side.
+        order: of the polynomial.
+        derivative: 0 for its value at each of the samples, 1 for its slope there, by sample.
+
+    Returns:
+        A row for each place in the window, a column for each sample.
+    """
+    places = np.arange(-half, half + 1) / max(half, 1)
+    powers = np.vander(places, order + 1, increasing=True)
+    at = powers if derivative == 0 else np.arange(order + 1) * np.pad(powers, ((0, 0), (1, 0)))[:, :-1] / max(half, 1)
+    return at @ np.linalg.pinv(powers)
+
+
+def savitzky_golay(values: Samples, window: int, order: int, derivative: int = 0) -> Samples:
+    """Value or slope by sample of the least-squares polynomial around each sample, at the ends that of the last window.
+
+    `scipy.signal.savgol_filter` gives the same, and takes half a second to import.
+    """
+    half = window // 2
+    weights = savitzky_golay_weights(half, order, derivative)
+    inner = np.correlate(values, weights[half], "valid")
+    return np.concatenate([weights[:half] @ values[:window], inner, weights[half + 1 :] @ values[-window:]])

@@ -19,7 +19,13 @@ from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import clock
-from jaxdamp.bench.motion import Samples, cycle_instants, dominant_frequency
+from jaxdamp.bench.motion import (
+    Samples,
+    cycle_instants,
+    dominant_frequency,
+    savitzky_golay,
+    savitzky_golay_weights,
+)
 
 
 METHODS = ("harmonic", "savitzky-golay")
@@ -84,9 +90,7 @@ def estimate_velocity(time: ArrayLike, stroke: ArrayLike, *, method: str | None 
             )
     rate = (len(time) - 1) / (time[-1] - time[0])
     window, order = _window(stroke, rate, frequency)
-    from scipy.signal import savgol_filter  # takes a second to import, and not every record needs it
-
-    velocity = np.asarray(savgol_filter(stroke, window, order, deriv=1, delta=1 / rate))
+    velocity = rate * savitzky_golay(stroke, window, order, derivative=1)
     width = f"{window} samples ({1e3 * (window - 1) / rate:.3g} ms)"
     return velocity, f"velocity from the stroke by a Savitzky-Golay filter of {width}, order {order}"
 
@@ -228,10 +232,8 @@ def _window(stroke: Samples, rate: float, frequency: float) -> tuple[int, int]:
 
 def _response(half: int, order: int, omega: Float[np.ndarray, " lines"]) -> Float[np.ndarray, " lines"]:
     """Gain of the differentiating filter at angular frequencies per sample; the ideal gain is ω itself."""
-    from scipy.signal import savgol_coeffs
-
     coefficients = np.zeros(2 * half)
-    coefficients[1 : half + 1] = savgol_coeffs(2 * half + 1, order, deriv=1, use="dot")[half + 1 :]
+    coefficients[1 : half + 1] = savitzky_golay_weights(half, order, 1)[half, half + 1 :]
     size = 32 * half
     return np.interp(omega, 2 * np.pi * np.arange(size // 2 + 1) / size, -2 * np.fft.rfft(coefficients, size).imag)
 

@@ -31,6 +31,7 @@ from jaxdamp.parameters import match_paths, modules_inside, named_parameters
 from jaxdamp.report import MOST_POINTS, Table, best_points, sweep_report, tuning_report
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import stationary_notes
+from jaxdamp.sweeps import without_effect
 from jaxdamp.tune import Run, Status, TuneResult, limit_spans
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -240,8 +241,6 @@ def sweep_command(
         baseline: to compare with: another law, or another tuning's vehicle.json, as JSON.
         block: compute this part of the sweep only, into a store; pip install 'jaxdamp[cluster]'.
     """
-    from jaxdamp.sweeps import without_effect  # with xarray and pandas, which other commands do without
-
     store = output.store("sweep")
     car = parse_vehicle(vehicle)(None if start is None else read_law("start", start))
     (surface,), run = driving.over(road)

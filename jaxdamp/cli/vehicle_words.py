@@ -9,6 +9,7 @@ import equinox as eqx
 
 from jaxdamp import _checks, export, vehicles
 from jaxdamp._tables import Contents
+from jaxdamp._traced import equal
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.early import EXAMPLE, FROM_FIT, read_json, read_vehicle
 from jaxdamp.dampers import AbstractDamper
@@ -126,7 +127,7 @@ def with_law(vehicle: AbstractVehicle, law: AbstractDamper) -> AbstractVehicle:
 def law_of(vehicle: AbstractVehicle) -> AbstractDamper | None:
     """The law that all dampers of a vehicle have; None where they differ."""
     first, *others = [*dampers_of(vehicle).values()] or [None]
-    return first if all(bool(eqx.tree_equal(first, law)) for law in others) else None
+    return first if all(equal(first, law) for law in others) else None
 
 
 def dampers_of(vehicle: AbstractVehicle) -> dict[str, AbstractDamper]:

@@ -10,6 +10,7 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, PyTree
 
 from jaxdamp import _checks
+from jaxdamp._traced import equal
 from jaxdamp.codegen import Program, Symbols, symbols
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.export._law_program import LawNumber, LawProgram
@@ -39,7 +40,7 @@ class RideProgram(VehicleProgram):
         refuse_controller(vehicle, "a page")
         super().__init__(vehicle, member=law.member)
         inside = [(prefix, module) for prefix, module in modules_inside(self.vehicle) if prefix]
-        self._places = [prefix for prefix, module in inside if eqx.tree_equal(module, law.law)]
+        self._places = [prefix for prefix, module in inside if equal(module, law.law)]
         if not self._places:
             remedy = "Build it with the law: `QuarterCar(..., damper=law)`."
             _checks.refuse("vehicle", "hold the law as a damper", repr(type(vehicle).__name__), remedy)

@@ -20,13 +20,13 @@ from jaxdamp.identify.held_out import HeldOut, on_records, without_parts
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import OFFSET, Machine, absent_paths, started_machine
 from jaxdamp.identify.model import on_rig
-from jaxdamp.identify.printed_law import PrintedLaw, WithPrinted, remember
 from jaxdamp.identify.reducing import reduced
 from jaxdamp.identify.rungs import Failure, Rung, ladder_table, verdict
 from jaxdamp.identify.scheduling import fit_scheduled, settings_stated
 from jaxdamp.identify.starting import AbstractTrainedStart, Start, check_starts, frozen_by, started
 from jaxdamp.identify.vehicle_comparing import VehicleComparison, compare_vehicles
 from jaxdamp.parameters import name_patterns, parameters
+from jaxdamp.rig import PrintedLaw, WithPrinted, remember
 from jaxdamp.vehicles import AbstractVehicle
 
 

@@ -12,7 +12,18 @@ from jaxtyping import Array, Float
 from jaxdamp._types import State
 from jaxdamp.bench import BenchRun
 from jaxdamp.identify.initial_states import rest_window
-from jaxdamp.identify.model import Model, OnRig, RecordStart, law_of, marched, on_rig, rig_of, starts_in, state_history
+from jaxdamp.identify.model import (
+    Model,
+    OnRig,
+    RecordStart,
+    count_states,
+    law_of,
+    marched,
+    on_rig,
+    rig_of,
+    starts_in,
+    state_history,
+)
 from jaxdamp.identify.traces import Batch, batches
 from jaxdamp.parameters import with_values
 from jaxdamp.rig import Followed
@@ -96,7 +107,7 @@ def _states_with_force(force: Callable[[State], Array], expected: State, size: S
 def with_first_states(model: Model, runs: Sequence[BenchRun]) -> Model:
     """The model with states at the first sample of every record: those it has, or those by the force at rest."""
     known = starts_in(model) or (None,) * len(runs)
-    if law_of(model).initial_state().size == 0 or all(start is not None for start in known):
+    if count_states(model) == 0 or all(start is not None for start in known):
         return model
     states = first_states(on_rig(law_of(model), rig_of(model)), runs).at_rest
     starts = [own or RecordStart(jnp.asarray(s)) for own, s in zip(known, states, strict=True)]

@@ -30,6 +30,7 @@ from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.left_out import left_out
 from jaxdamp.identify.model import (
     Model,
+    count_states,
     covered_range,
     is_memoryless,
     law_of,
@@ -197,7 +198,7 @@ def _undeclared(law: AbstractDamper) -> list[str]:
 def _without_place(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
     """A sentence on a law that depends on the place of the stroke, which integrated strokes do not have."""
     traits = law.traits()
-    depends = traits.stroke_dependent_at_rest or (traits.stroke_dependent and not law.initial_state().size)
+    depends = traits.stroke_dependent_at_rest or (traits.stroke_dependent and not count_states(law))
     integrated = [run.name for run in runs if run.stroke_is_integrated]
     if not (depends and integrated):
         return []

@@ -5,14 +5,11 @@ import functools
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, final
 
-import equinox as eqx
 import jax
 import numpy as np
-from jaxtyping import Array, Float
 
 from jaxdamp import _checks, dampers
 from jaxdamp._tables import Column, Table
-from jaxdamp._types import Scalar
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import (
     AbstractDamper,
@@ -38,7 +35,7 @@ from jaxdamp.dampers import (
     ViscoPlastic,
 )
 from jaxdamp.identify.fitting import NUMERICAL
-from jaxdamp.identify.machine import OFFSET, Machine, lag_time, started_on
+from jaxdamp.identify.machine import OFFSET, Machine, force_at, lag_time, started_on
 from jaxdamp.identify.starting import AbstractTrainedStart, Start
 from jaxdamp.identify.training import Training, train
 
@@ -59,14 +56,7 @@ def _friction(velocity: np.ndarray, force: np.ndarray) -> AbstractDamper:
 def _rate(law: AbstractMemoryless, velocity: np.ndarray) -> float:
     """Secant slope [N s/m] at the RMS velocity."""
     v = float(np.sqrt(np.mean(velocity**2)))
-    up, down = (float(_force(law, jax.numpy.asarray(speed))) for speed in (v, -v))
-    return (up - down) / (2 * v)
-
-
-@eqx.filter_jit
-def _force(law: AbstractMemoryless, v: Float[Array, ""]) -> Scalar:
-    """In one program: JAX would compile each operation."""
-    return law.force_velocity(v)
+    return (force_at(law, v) - force_at(law, -v)) / (2 * v)
 
 
 _MEMORYLESS = {

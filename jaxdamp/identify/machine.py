@@ -4,11 +4,14 @@ import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._types import Scalar
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, laws_inside
 from jaxdamp.identify.gas import charged_apart
@@ -273,7 +276,7 @@ def with_static_force_on_machine(problem: Problem, solution: Solution) -> tuple[
     def at_rest(values: np.ndarray) -> float:
         """The force [N] between those at the slowest samples in both directions: zero velocity may not be sampled."""
         law = law_of(free.started_at(values).tree)
-        forces = [float(law.force(0.0, v, law.initial_state())) for v in beside]
+        forces = [force_at(law, v) for v in beside]
         return float(np.interp(0.0, beside, forces))
 
     unit = at_rest(np.asarray(free.values) + moved) - at_rest(np.asarray(free.values))
@@ -289,6 +292,16 @@ def with_static_force_on_machine(problem: Problem, solution: Solution) -> tuple[
     free = dataclasses.replace(free, tree=on_rig(law, machine, starts_in(model)), chosen=chosen, ties=ties)
     ends = tuple(best if end is solution.best else shifted(end) for end in solution.ends)
     return problem._replace(free=free.started_at(best.values)), solution._replace(best=best, ends=ends)
+
+
+def force_at(law: AbstractDamper, velocity: float) -> float:
+    """The force [N] at a velocity [m/s], stroke zero and the states of rest, in one program for all its operations."""
+    return float(_force(law, jnp.asarray(np.asarray(velocity, float))))
+
+
+@eqx.filter_jit
+def _force(law: AbstractDamper, velocity: Float[Array, ""]) -> Scalar:
+    return law.force(0.0, velocity, law.initial_state())
 
 
 def static_force_in_words(result: FitResult, runs: tuple[BenchRun, ...]) -> list[str]:

@@ -210,9 +210,14 @@ def effects_of(model: Model) -> tuple[str, ...]:
     return () if rig is None else rig.effects()
 
 
+def count_states(model: Model) -> int:
+    """How many states the law has; nothing is compiled for that."""
+    return int(jax.eval_shape(lambda: law_of(model).initial_state()).size)
+
+
 def is_memoryless(model: Model) -> bool:
     """Whether the force depends on stroke and velocity of the instant alone."""
-    return law_of(model).initial_state().size == 0 and not effects_of(model)
+    return count_states(model) == 0 and not effects_of(model)
 
 
 def can_rest(model: Model) -> bool:
@@ -220,7 +225,7 @@ def can_rest(model: Model) -> bool:
 
     Without them its force at rest is one number, while dry friction holds any force up to its own.
     """
-    return law_of(model).initial_state().size > 0
+    return count_states(model) > 0
 
 
 def initial_state_for(model: Model, initial_state: str) -> str:

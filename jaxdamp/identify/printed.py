@@ -16,13 +16,23 @@ from jaxtyping import Float, Int, PyTree
 from jaxdamp._traced import is_traced
 from jaxdamp._triangles import triangle
 from jaxdamp.dampers import laws_inside
-from jaxdamp.identify.model import Model, starts_in
-from jaxdamp.identify.printed_law import PrintedLaw, numbers_on_rig, plain_rig, printed_law, say
-from jaxdamp.identify.printed_records import PRINTED, MachinePlaces, Row, rows_of
+from jaxdamp.identify.model import Model, law_of, rig_of, starts_in
 from jaxdamp.identify.problem import AbstractResiduals
 from jaxdamp.identify.traces import Batch
 from jaxdamp.parameters import FreeParameters, get, with_values
-from jaxdamp.rig import LawNumbers, Rig, is_number
+from jaxdamp.rig import (
+    PRINTED,
+    LawNumbers,
+    MachinePlaces,
+    PrintedLaw,
+    PrintedRecord,
+    Rig,
+    is_number,
+    numbers_on_rig,
+    plain_rig,
+    printed_law,
+    say,
+)
 
 
 def _blank(tree: PyTree) -> PyTree:
@@ -63,11 +73,23 @@ def predicted(batch: Batch, model: Model) -> Float[np.ndarray, "runs time"] | No
     return np.stack(forces)
 
 
+def rows_of(batch: Batch) -> list[PrintedRecord]:
+    """The records of a batch."""
+    columns = (batch.dt, batch.stroke, batch.velocity, batch.weight, batch.force)
+    arrays = zip(*(np.ascontiguousarray(np.asarray(column)) for column in columns), strict=True)
+    return [PrintedRecord(float(dt), x, v, w, f, batch.substeps, batch.effects) for dt, x, v, w, f in arrays]
+
+
 def _numbers_of(batch: Batch, model: Model, rig: Rig | None = None) -> list[LawNumbers]:
     """The numbers of the law in each record: the same object where no record has values of its own."""
     if not batch.fixed and not batch.per_record:
-        return [numbers_on_rig(model, rig)] * len(batch.dt)
-    return [numbers_on_rig(_of_row(batch, model, row), rig) for row in range(len(batch.dt))]
+        return [_numbers(model, rig)] * len(batch.dt)
+    return [_numbers(_of_row(batch, model, row), rig) for row in range(len(batch.dt))]
+
+
+def _numbers(model: Model, rig: Rig | None = None) -> LawNumbers:
+    """The numbers of a law on its machine, or on another one if it has none."""
+    return numbers_on_rig(law_of(model), rig_of(model) or rig)
 
 
 def _of_row(batch: Batch, model: Model, row: int) -> Model:
@@ -93,7 +115,7 @@ class Evaluator:
     """
 
     law: PrintedLaw
-    rows: list[tuple[int, Row, np.ndarray, np.ndarray]]
+    rows: list[tuple[int, PrintedRecord, np.ndarray, np.ndarray]]
     size: int
     free: int
     derivatives: Int[np.ndarray, " slopes"]
@@ -163,7 +185,7 @@ def evaluators(free: FreeParameters, problems: Sequence[Sequence[AbstractResidua
         say(f"Computed by XLA: {reason}.")
         return []
     model, taken = free.build(free.values), _taken(free)  # with the values that are tied to others
-    common = numbers_on_rig(model), numbers_on_rig(taken, _blank(plain_rig()))
+    common = _numbers(model), _numbers(taken, _blank(plain_rig()))
     each = [_with_numbers(residuals, model, taken, common) for residuals in problems]
     unique = {id(numbers): numbers for records in each for _, *both in records for numbers in both}
     marked = [unique[key] for key in {id(taken) for records in each for *_, taken in records}]
@@ -194,7 +216,7 @@ def rows_beside(free: FreeParameters, residuals: Sequence[AbstractResiduals]) ->
 
 def _with_numbers(
     residuals: Sequence[AbstractResiduals], model: Model, taken: PyTree, common: tuple[LawNumbers, LawNumbers]
-) -> list[tuple[Row, LawNumbers, LawNumbers]]:
+) -> list[tuple[PrintedRecord, LawNumbers, LawNumbers]]:
     """The records with the numbers of their laws, and with the number of the free value that each takes.
 
     Arguments:

@@ -19,7 +19,7 @@ from jaxdamp._tables import Column, Table, plain
 from jaxdamp._types import Figure
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, keeps_conditions, laws_inside, without_fitted_ranges
-from jaxdamp.identify.model import fitted_part, of_law
+from jaxdamp.identify.model import count_states, fitted_part, of_law
 from jaxdamp.identify.noise import Noise
 from jaxdamp.identify.printed import evaluator
 from jaxdamp.identify.problem import Problem
@@ -189,7 +189,7 @@ def band(evidence: Evidence, law: AbstractDamper, velocities: Float[np.ndarray, 
     """`FitResult.band`."""
     velocity = np.asarray(velocities, float)
     force = np.asarray(quasi_static(law, velocity).force, float)
-    steps = 1 if law.initial_state().size == 0 else round(HELD / STEP)
+    steps = 1 if count_states(law) == 0 else round(HELD / STEP)
     slopes = _printed_slopes(evidence, velocity, steps)
     if slopes is None:
         error = propagate(evidence, functools.partial(_held, velocity=velocity, steps=steps)).standard_error

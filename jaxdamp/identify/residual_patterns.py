@@ -5,12 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
-from scipy.interpolate import CubicSpline
-from scipy.signal import lfilter
 
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.traces import Batch
+from jaxdamp.rig import delayed_samples, lagged_samples
 
 
 FRICTION_VELOCITY = 0.005  # m/s, width of the sign change of friction
@@ -231,19 +230,18 @@ def hysteresis(records: Sequence[Record], late: dict[str, float]) -> Pattern:
 
 def delayed(motion: Motion, delay: float) -> Values:
     """The force a time later [s], less the force."""
-    time, force = motion.time, motion.force
-    return CubicSpline(time, force)(np.clip(time - delay, time[0], time[-1])) - force
+    step = motion.time[1] - motion.time[0]
+    return delayed_samples(motion.force, delay / step)[0] - motion.force
 
 
 def filtered(motion: Motion, lag: float) -> Values:
     """The force behind a first-order lag [s], exact for straight lines between the samples, less the force."""
-    force, ratio = motion.force, (motion.time[1] - motion.time[0]) / abs(lag)
-    if ratio > SHORT:
+    force, samples = motion.force, abs(lag) / (motion.time[1] - motion.time[0])
+    if samples < 1.0 / SHORT:
         return -lag * np.gradient(force, motion.time)
-    decay, part = np.exp(-ratio), -np.expm1(-ratio) / ratio
-    feed, first = np.array([1.0 - part, part - decay]), force[0] - (force[1] - force[0]) / ratio
-    following, _ = lfilter(feed, [1.0, -decay], force[1:], zi=[feed[1] * force[0] + decay * first])
-    return np.concatenate([[first], following]) - force
+    from_rest = lagged_samples(force[:, None], samples)[0][:, 0]
+    before = samples * (force[1] - force[0])  # the first straight line goes on before the record
+    return from_rest - before * np.exp(-np.arange(force.size) / samples) - force
 
 
 LATE = {"delay": delayed, "lag": filtered}

@@ -1,7 +1,5 @@
 """Numbers with their spread: many dampers, control charts, posteriors, targets, other roads, points of a sweep."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from jaxdamp import _checks
@@ -9,11 +7,8 @@ from jaxdamp._tables import typeset_unit
 from jaxdamp._types import Axes, Figure
 from jaxdamp.identify import ControlCharts, ManyFits, Posterior, TargetFit
 from jaxdamp.plots import _style
+from jaxdamp.sweeps import SweepSummary
 from jaxdamp.tune import DamperComparison, Rescore
-
-
-if TYPE_CHECKING:
-    from jaxdamp.sweeps import SweepSummary
 
 
 _COLUMNS = 3  # of panels
@@ -207,8 +202,6 @@ def sweep_summary(result: "SweepSummary") -> Figure:
     Arguments:
         result: of `jaxdamp.sweep(..., summary=...)`.
     """
-    from jaxdamp.sweeps import SweepSummary  # with xarray and pandas, which other pictures do without
-
     remedy = "The call is `sweep_summary(found)` with the result of `jaxdamp.sweep(..., summary=sweeps.Summary())`."
     _checks.instance("result", result, SweepSummary, "be the summary of a sweep", remedy)
     names = [str(name) for name in result.statistics.data_vars]

@@ -9,6 +9,7 @@ from jaxdamp import _checks
 from jaxdamp._tables import typeset_unit
 from jaxdamp._types import Artist, Axes, Dataset, Figure
 from jaxdamp.plots import _axes, _style
+from jaxdamp.sweeps import without_effect
 from jaxdamp.tune import Limits, limit_spans
 
 
@@ -64,8 +65,6 @@ def sweep(
     figure = _style.new_figure(7.0, 4.6)
     plot = figure.add_subplot()
     over_axes = " and ".join(_words(data, name) for name in axes)
-    from jaxdamp.sweeps import without_effect  # with xarray and pandas, which other pictures do without
-
     idle = without_effect(data).get(metric, [])
     flat = f" (no effect of {' and '.join(_words(data, name) for name in idle)})" if idle else ""
     what = _words(data, metric) if against is None else "Designs"

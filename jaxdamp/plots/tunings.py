@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 
-import equinox as eqx
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._tables import percent_change, typeset_unit
+from jaxdamp._traced import equal
 from jaxdamp._types import Artist, Axes, Figure, VectorLike
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.plots import _style, fitted_range
@@ -71,7 +71,7 @@ def _changed(result: TuneResult) -> dict[str, tuple[AbstractDamper, AbstractDamp
     """The laws of both vehicles by the names of the dampers: those that differ, or the first."""
     names = [_style.first_upper(_style.in_words(name)) for name in result.start.frame().element_names]
     pairs = list(zip(*(own_laws(vehicle) for vehicle in (result.start, result.vehicle)), strict=True))
-    differing = [i for i, (old, new) in enumerate(pairs) if not eqx.tree_equal(old, new)] or [0]
+    differing = [i for i, (old, new) in enumerate(pairs) if not equal(old, new)] or [0]
     return {names[i]: pairs[i] for i in differing}
 
 
@@ -204,14 +204,8 @@ def _label(front: ParetoFront, name: str) -> str:
 def _laws_along(front: ParetoFront) -> dict[str, list[AbstractDamper]]:
     """The laws that differ along the front, by a title: each at every point."""
     along = list(zip(*(own_laws(front.point(i)) for i in range(len(front))), strict=True))
-    places = [i for i, group in enumerate(along) if not _all_equal(group)]
+    places = [i for i, group in enumerate(along) if not all(equal(group[0], law) for law in group[1:])]
     return {f"Damper {i + 1}" if len(along) > 1 else "Damper": list(along[i]) for i in places}
-
-
-def _all_equal(laws: tuple[AbstractDamper, ...]) -> bool:
-    import equinox as eqx
-
-    return all(bool(eqx.tree_equal(laws[0], law)) for law in laws[1:])
 
 
 def _curves(

@@ -9,6 +9,7 @@ from jaxdamp._tables import percent_change, typeset_unit
 from jaxdamp._types import DataArray, Dataset, ScalarLike
 from jaxdamp._words import path_words
 from jaxdamp.report.page import Attempts, Report
+from jaxdamp.sweeps import without_effect
 from jaxdamp.tune import Limits, limit_spans
 
 
@@ -82,8 +83,6 @@ def best_points(
         allowed = allowed & (data[name] >= lower) & (data[name] <= upper)
     count, total = int(allowed.sum()), int(allowed.size)
     sentences = [f"{count} of {total} points are within all limits."] if limits else []
-    from jaxdamp.sweeps import without_effect  # with xarray and pandas, which other pages do without
-
     idle = without_effect(data)
     sentences += [
         f"{path_words(over)} has no effect on {path_words(name)}: no value of it is better than another."

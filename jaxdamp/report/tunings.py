@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-import equinox as eqx
 import numpy as np
 
 from jaxdamp import _checks, plots
 from jaxdamp._tables import Compared, Table, comparison_table, percent_change
+from jaxdamp._traced import equal
 from jaxdamp.parameters import get
 from jaxdamp.report.page import Attempts, Report
 from jaxdamp.simulation import Response, Ride
@@ -96,7 +96,7 @@ def add_baseline(report: Report, result: TuneResult, baseline: AbstractVehicle) 
     for path in damper_paths(result.vehicle):
         cars = {"baseline": baseline, "before": result.start, "after": result.vehicle}
         laws = {name: get(car, path) for name, car in cars.items()}
-        if not all(eqx.tree_equal(laws["after"], law) for law in laws.values()):
+        if not all(equal(laws["after"], law) for law in laws.values()):
             points = np.linspace(-reach, reach, 401)
             report.picture(
                 lambda laws=laws, points=points: plots.force_velocity(laws, points, baseline="baseline"),

@@ -1,9 +1,7 @@
 """The force of a law at constant velocity: the curve without hysteresis."""
 
-import ctypes
 import functools
-import math
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Hashable
 from typing import NamedTuple
 
 import equinox as eqx
@@ -15,49 +13,9 @@ from jaxtyping import Array, Bool, Float, Int, PyTree
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._traced import of_known_numbers
-from jaxdamp.codegen import C, PrintedFunction, Symbols, library, lower, symbols
-from jaxdamp.dampers import AbstractDamper, coverage, without_fitted_ranges
+from jaxdamp.dampers import AbstractDamper, coverage
 from jaxdamp.parameters import as_float
-
-
-class LawNumbers(NamedTuple):
-    """A law, or a law on a machine, as plain numbers.
-
-    Attributes:
-        key: its structure, and what of it is no number of a program.
-        tree: how it is put together.
-        others: its leaves, with None in place of arrays of numbers.
-        arrays: the arrays of numbers, in the order of the leaves.
-    """
-
-    key: Hashable
-    tree: PyTree
-    others: tuple[object, ...]
-    arrays: list[np.ndarray]
-
-    def built(self, arrays: Sequence[object]) -> PyTree:
-        """The same with other numbers."""
-        rest = iter(arrays)
-        return jax.tree.unflatten(self.tree, [next(rest) if leaf is None else leaf for leaf in self.others])
-
-    @property
-    def flat(self) -> np.ndarray:
-        """All numbers, as the C functions take them."""
-        return np.concatenate([np.zeros(0), *map(np.ravel, self.arrays)])
-
-
-def is_number(leaf: object) -> bool:
-    """Whether a leaf of a law is an array of numbers that a program takes."""
-    return isinstance(leaf, jax.Array | np.ndarray) and np.issubdtype(leaf.dtype, np.floating)
-
-
-def numbers_of(law: PyTree) -> LawNumbers:
-    """The numbers of a law whose values are known; the range that it was fitted to is left out."""
-    leaves, tree = jax.tree.flatten(without_fitted_ranges(law))
-    others = tuple(None if is_number(leaf) else leaf for leaf in leaves)
-    arrays = [np.asarray(leaf, np.float64) for leaf in leaves if is_number(leaf)]
-    fixed = tuple(np.asarray(leaf).tobytes() if isinstance(leaf, jax.Array) else repr(leaf) for leaf in others)
-    return LawNumbers((tree, fixed, tuple(array.shape for array in arrays)), tree, others, arrays)
+from jaxdamp.rig.printed import is_number, numbers_of, numbers_on_rig, printed_law
 
 
 class QuasiStatic(NamedTuple):
@@ -78,7 +36,7 @@ class QuasiStatic(NamedTuple):
     states: Float[Array, "points states"]
 
 
-MOST_REMEMBERED = 64  # curves, and C functions
+MOST_REMEMBERED = 64  # curves
 LONGEST_HOLD = 64  # s at constant velocity
 STEADY = 1e-4  # change of a force while the time held doubles, relative to the scale of the forces: settled
 STILL = {"float64": 1e-9, "float32": 1e-3}  # the same, at which no longer hold can improve the curve
@@ -178,12 +136,11 @@ def _gaps(law: AbstractDamper, velocity: np.ndarray, force: np.ndarray, settled:
 def _hold(law: AbstractDamper, velocities: Array, states: Array, count: Array) -> tuple[Array, Array]:
     """States and forces after so many more milliseconds at constant velocities."""
     if velocities.dtype == np.float64 and states.size:
-        numbers = numbers_of(law)
-        printed = _printed_hold(_Keyed(numbers.key, numbers))
+        numbers = numbers_on_rig(law)
+        printed = printed_law(numbers, None)
         if printed is not None:
-            p, v = numbers.flat, np.ascontiguousarray(velocities, np.float64)
-            s, force = np.array(states, np.float64), np.empty(v.size)
-            printed(p.ctypes.data, v.size, v.ctypes.data, int(count), s.ctypes.data, force.ctypes.data)
+            s = np.array(states, np.float64)
+            force = printed.hold(numbers.flat, np.ascontiguousarray(velocities, np.float64), int(count), s)
             return on_device(s), on_device(force)
     return _held_by_xla(law, velocities, states, count)
 
@@ -203,59 +160,3 @@ def _held_by_xla(law: AbstractDamper, velocities: Array, states: Array, count: I
         return state, law.force(zero, v, state)
 
     return jax.vmap(one)(velocities, states)
-
-
-_HEADS = {"void advance": "double", "double force": "const double"}
-_C_HOLD = """
-void hold(const double *p, int64_t points, const double *v, int64_t count, double *states, double *forces)
-{
-    for (int64_t i = 0; i < points; i++) {
-        double *s = states + i * STATES, before[STATES];
-        for (int64_t step = 0, moves = 1; moves && step < count; step++) {
-            moves = 0;
-            memcpy(before, s, sizeof before);
-            advance(p, v[i], s);
-            for (int m = 0; m < STATES; m++) moves |= !(fabs(s[m] - before[m]) <= 4e-16 * fabs(s[m]));
-        }
-        forces[i] = force(p, v[i], s);
-    }
-}
-"""
-
-
-@functools.lru_cache(maxsize=MOST_REMEMBERED)
-def _printed_hold(structure: _Keyed) -> Callable[..., None] | None:
-    """`_hold` as a C function, which ends where the states stand still; None where XLA computes it."""
-    (numbers,) = structure.content
-    count, shapes = int(numbers.built(numbers.arrays).initial_state().size), [a.shape for a in numbers.arrays]
-    ends, names = np.cumsum([math.prod(shape) for shape in shapes]), symbols("p", (numbers.flat.size,)).names
-    cut = zip(ends, shapes, strict=True)
-    arrays = [Symbols(names[end - math.prod(shape) : end].reshape(shape)) for end, shape in cut]
-
-    def advance(arrays: list[Array], v: Array, s: Array) -> Array:
-        return numbers.built(arrays).advance(jnp.zeros(()), v, jnp.zeros(()), v, s, jnp.asarray(1e-3))
-
-    def force(arrays: list[Array], v: Array, s: Array) -> Array:
-        return numbers.built(arrays).force(jnp.zeros(()), v, s)
-
-    try:
-        given = (arrays, symbols("v"), symbols("s", (count,)))
-        step, end = lower(advance, *given), lower(force, *given)
-        outputs = [(f"s[{i}]", atom) for i, atom in enumerate(np.ravel(step.results))]
-        value = np.ravel(np.asarray(end.results, object))[0]
-        heads = [f"static {kind}(const double *p, double v, {s} *s)" for kind, s in _HEADS.items()]
-        text = "".join(
-            [
-                "".join(f"#include <{name}.h>\n" for name in ("math", "stdint", "stdbool", "string")),
-                f"enum {{ STATES = {count} }};\n",
-                C().function(PrintedFunction(heads[0], ["p", "v", "s"], step.statements, outputs)),
-                C().function(PrintedFunction(heads[1], ["p", "v", "s"], end.statements, (), value)),
-                _C_HOLD,
-            ]
-        )
-        hold = library(text).hold
-    except NotImplementedError:
-        return None
-    pointer, whole = ctypes.c_void_p, ctypes.c_int64
-    hold.argtypes, hold.restype = [pointer, whole, pointer, whole, pointer, pointer], None
-    return hold

@@ -190,9 +190,10 @@ def with_proposal(
     size, proposal = state.step_size, at(state.step_size)
     again = ~accepted & state.whole & proposal.small & (size < LARGEST_STEP_SIZE)
     size, _, proposal = _while(xp, lambda carry: xp.any(carry[1]), longer, (size, again, proposal))
-    whole = accepted & proposal.small & ~state.converged
+    whole, converged = accepted & proposal.small & ~state.converged, state.converged
     if xp is jnp or np.any(whole):
         undamped = at(xp.full_like(size, LARGEST_STEP_SIZE))
+        converged = converged | (whole & undamped.small & (rules.patience is not None))
         whole = whole & ~undamped.small
         proposal = where(xp, whole, undamped, proposal)
     return state._replace(
@@ -202,6 +203,7 @@ def with_proposal(
         floor=floor,
         short=proposal.short,
         whole=whole,
+        converged=converged,
         stuck=~state.converged & ~xp.all(xp.isfinite(proposal.step), axis=-1),
     )
 

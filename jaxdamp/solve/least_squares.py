@@ -69,7 +69,8 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         rtol: largest step that counts as short, relative to each unknown.
         atol: the same added to it.
         patience: points tried in a row without a decrease worth a step of `tolerance`, after which a search ends too,
-            as it does if the whole step gains nothing; None for no such end.
+            as it does if the whole step gains nothing, or no step promises such a decrease, which is then not tried;
+            None for no such ends.
         norm: the largest of all unknowns decides whether a step is short.
 
     >>> time = jnp.linspace(0.0, 2.0, 50)

@@ -16,7 +16,7 @@ from jaxdamp._jacobian import with_jacobian
 from jaxdamp._progress import Progress
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Contents, Table, plain, typeset_unit
-from jaxdamp._traced import of_known_numbers
+from jaxdamp._traced import equal, of_known_numbers
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.metrics import Metric
 from jaxdamp.parameters import FreeParameters, free_parameters
@@ -243,7 +243,7 @@ def _check(dampers: object, vehicle: object, roads: object) -> None:
     listed = [] if isinstance(roads, WhiteRoad) else list(roads)
     for i, road in enumerate(listed):
         check_module(f"roads[{i}]", road, (AbstractRoad,), call)
-        again = next((j for j in range(i) if bool(eqx.tree_equal(listed[j], road))), None)
+        again = next((j for j in range(i) if equal(listed[j], road)), None)
         if again is not None:
             remedy = "Take several seeds: a road that counts twice makes the error of the mean too small."
             _checks.refuse(f"roads[{i}]", "be another road than the others", f"roads[{again}] again", remedy)

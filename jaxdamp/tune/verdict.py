@@ -171,11 +171,11 @@ def half_interval(values: Float[np.ndarray, " roads"], level: float = 0.95) -> f
         values: one for each road.
         level: of the interval.
     """
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
     if len(values) < 2:
         return np.inf
-    return float(t.ppf(0.5 + 0.5 * level, len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values)))
+    return float(stdtrit(len(values) - 1, 0.5 + 0.5 * level) * np.std(values, ddof=1) / np.sqrt(len(values)))
 
 
 def decided(fresh: "Rescore", allowed: Mapping[str, LimitRange]) -> bool:

@@ -2,8 +2,10 @@
 
 from typing import NamedTuple
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from jaxdamp._field_types import check_module
 from jaxdamp._limits import root
@@ -69,9 +71,14 @@ def _springs(frame: Frame) -> list[Scalar]:
     laws = [element.together for part in (*frame.links, *frame.wheels) for element in part.elements]
     slopes = jnp.zeros(len(laws))
     if any(law.traits().stroke_dependent_at_rest for law in laws):
-        slopes, _ = Ports(laws).stiffness_and_damping(slopes)
+        slopes = _stiffness(Ports(laws), slopes)
     ends = np.cumsum([0, *(len(link.elements) for link in frame.links)])
     return [link.stiffness + jnp.sum(slopes[ends[i] : ends[i + 1]]) for i, link in enumerate(frame.links)]
+
+
+@eqx.filter_jit
+def _stiffness(ports: Ports, deflection: Float[Array, " ports"]) -> Float[Array, " ports"]:
+    return ports.stiffness_and_damping(deflection)[0]
 
 
 def _lower_end(link: Link, on_road: set[str]) -> str:

@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
+from scipy.signal import savgol_coeffs, savgol_filter
 
 from jaxdamp.bench import RandomTest, estimate_velocity
+from jaxdamp.bench.motion import savitzky_golay, savitzky_golay_weights
 
 
 def _error(estimate: np.ndarray, truth: np.ndarray) -> float:
@@ -127,3 +129,16 @@ def test_bad_arguments():
         estimate_velocity(time, np.full_like(time, 0.1))
     with pytest.raises(ValueError, match="stroke is nan"):
         estimate_velocity(time, np.where(time == time[7], np.nan, stroke))
+
+
+@pytest.mark.parametrize(("window", "order"), [(5, 3), (11, 4), (31, 5), (301, 3)])
+@pytest.mark.parametrize("derivative", [0, 1])
+def test_the_filter_is_that_of_scipy(window, order, derivative, rng):
+    """At the ends too, where the polynomial of the last window goes on."""
+    values = rng.standard_normal(400)
+    expected = savgol_filter(values, window, order, deriv=derivative)
+    ours = savitzky_golay(values, window, order, derivative)
+    np.testing.assert_allclose(ours, expected, atol=1e-9 * np.max(np.abs(expected)))
+    weights = savitzky_golay_weights(window // 2, order, derivative)[window // 2]
+    coefficients = savgol_coeffs(window, order, deriv=derivative, use="dot")
+    np.testing.assert_allclose(weights, coefficients, atol=1e-9 * np.max(np.abs(coefficients)))

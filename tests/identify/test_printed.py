@@ -11,9 +11,9 @@ from jaxdamp import identify
 from jaxdamp.bench import SineTest, VirtualDyno
 from jaxdamp.codegen import _native
 from jaxdamp.dampers import Besinger, Lag, Linear, LuGre, Spring
-from jaxdamp.identify import printed, printed_law, search
+from jaxdamp.identify import printed, search
 from jaxdamp.identify.traces import Batch
-from jaxdamp.rig import Rig
+from jaxdamp.rig import Rig, printed as printed_laws
 
 
 TRUTH = LuGre.guess(np.array([-0.3, 0.0, 0.3]), np.array([-600.0, 100.0, 900.0])) + Linear(1500.0) + Spring(2000.0)
@@ -132,10 +132,10 @@ def test_without_a_compiler_xla_computes_it_and_the_log_says_so(runs, monkeypatc
     monkeypatch.setattr(_native, "_lasting_folder", lambda: None)  # nor one compiled earlier
     _native.library.cache_clear()
     for memory in ("_laws", "_refused"):
-        monkeypatch.setattr(printed_law, memory, {})
-    printed_law.say.cache_clear()
+        monkeypatch.setattr(printed_laws, memory, {})
+    printed_laws.say.cache_clear()
     problem = identify.prepare(Linear(1000.0), runs)
-    with caplog.at_level(logging.INFO, "jaxdamp.identify.printed"):
+    with caplog.at_level(logging.INFO, "jaxdamp.printed"):
         assert printed.evaluator(problem.free, problem.residuals) is None
         assert printed.evaluator(problem.free, problem.residuals) is None
     assert [record.message.startswith("Linear is computed by XLA.") for record in caplog.records] == [True]

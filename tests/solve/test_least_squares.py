@@ -188,3 +188,22 @@ def test_patience_ends_a_search_that_gains_nothing(patience):
     assert host.steps[0] == int(end.stats["num_steps"]) and host.status == [Status.CONVERGED]
     np.testing.assert_allclose(host.y[0], end.value, atol=1e-12)
     assert host.steps[0] == 4 if patience else host.steps[0] > 6
+
+
+@pytest.mark.parametrize(("patience", "steps"), [(None, 2), (3, 1)])
+def test_a_start_from_which_no_step_promises_enough_is_the_end_of_a_search_with_patience(patience, steps):
+    """The minimum of a parabola a hundredth of a standard error away; without patience the step is taken."""
+
+    def missed(y):
+        return jnp.concatenate([y, jnp.ones(3)])
+
+    def at(y, lanes):
+        rows = np.concatenate([np.eye(2), y.T], axis=1), np.array([[0.0, 0.0, np.sqrt(3.0)]])
+        return Linearisation(np.concatenate(rows)[None], np.zeros((1, 0)), np.zeros((1, 0, 2)), np.array([5.0])), y
+
+    solver, start = BoundedLevenbergMarquardt(tolerance=0.1, patience=patience), np.array([[0.01, 0.0]])
+    host = least_squares_on_host(at, solver, start, 50)
+    end = optx.least_squares(lambda y, _: missed(y), solver, jnp.asarray(start[0]), max_steps=50)
+    assert host.steps[0] == int(end.stats["num_steps"]) == steps and host.status == [Status.CONVERGED]
+    np.testing.assert_allclose(host.y[0], end.value, atol=1e-12)
+    np.testing.assert_allclose(host.y[0], start[0] if patience else 0.0, atol=0.0 if patience else 1e-3)

@@ -8,8 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from jaxdamp.identify.traces import Batch
-
 
 PRINTED = ("delay", "inertia", "lag", "command_lag")  # effects of a machine that are computed here
 Samples = Float[np.ndarray, " time"]
@@ -24,7 +22,7 @@ class MachineNumbers(NamedTuple):
 
 
 class MachinePlaces(NamedTuple):
-    """Where these numbers stand, or their derivatives: −1 where there are none."""
+    """Where the numbers delay, mass and lag stand, or their derivatives: −1 where there are none."""
 
     delay: int
     mass: int
@@ -41,7 +39,7 @@ class Motion(NamedTuple):
 
     @classmethod
     def refined(cls, stroke: Samples, velocity: Samples, dt: float, parts: int) -> "Motion":
-        """`rig.marching.finer` by NumPy."""
+        """`marching.finer` by NumPy."""
         x, v = np.ascontiguousarray(stroke), np.ascontiguousarray(velocity)
         if parts == 1:
             return cls(x, v, x, v)
@@ -65,14 +63,24 @@ class Record(NamedTuple):
     step: float  # s, of a part
     weight: Samples
     force: Samples
-    used: int  # samples, as `Row.used`
+    used: int  # samples, as `PrintedRecord.used`
 
 
 @dataclasses.dataclass(frozen=True)
-class Row:
-    """A record of a batch, with what its machine adds."""
+class PrintedRecord:
+    """A record of a batch, with what its machine adds.
 
-    dt: float  # s
+    Attributes:
+        dt: time step [s].
+        stroke: measured stroke [m].
+        velocity: of it [m/s].
+        weight: of each sample in the residual; zero for those that are left out.
+        force: measured force [N].
+        parts: into which the step is divided.
+        effects: of the machine, some of `PRINTED`.
+    """
+
+    dt: float
     stroke: Samples
     velocity: Samples
     weight: Samples
@@ -95,7 +103,7 @@ class Row:
         """The record later by a delay [s], its force without a weight; at every part of a step before a lag."""
         motions = [(self.stroke, self.velocity)]
         if "delay" in self.effects:
-            (x, by_x), (v, by_v) = (delayed(values, delay / self.dt) for values in motions[0])
+            (x, by_x), (v, by_v) = (delayed_samples(values, delay / self.dt) for values in motions[0])
             motions = [(x, v), (by_x / self.dt, by_v / self.dt)]
         first, *others = (Motion.refined(x, v, self.dt, self.parts) for x, v in motions)
         parts, step = self.parts, self.dt / self.parts
@@ -130,7 +138,7 @@ class Row:
                 _add(forces, columns.delay, numbers.mass * change)
         if "lag" not in self.effects:
             return forces
-        forces, by_samples = lagged(forces, numbers.lag / record.step)
+        forces, by_samples = lagged_samples(forces, numbers.lag / record.step)
         _add(forces, columns.lag, by_samples / record.step)
         return forces[:: self.parts]
 
@@ -149,15 +157,8 @@ def _add(forces: Float[np.ndarray, "time columns"], column: int, change: Samples
         forces[:, column] += change
 
 
-def rows_of(batch: Batch) -> list[Row]:
-    """The records of a batch."""
-    columns = (batch.dt, batch.stroke, batch.velocity, batch.weight, batch.force)
-    arrays = zip(*(np.ascontiguousarray(np.asarray(column)) for column in columns), strict=True)
-    return [Row(float(dt), x, v, w, f, batch.substeps, batch.effects) for dt, x, v, w, f in arrays]
-
-
-def delayed(values: Samples, samples: float) -> tuple[Samples, Samples]:
-    """`rig.sensor.delayed` by NumPy, and its derivative by the number of samples."""
+def delayed_samples(values: Samples, samples: float) -> tuple[Samples, Samples]:
+    """`sensor.delayed` of values by NumPy, and its derivative by the number of samples."""
     last = len(values) - 1
     wanted = np.arange(len(values)) - samples
     places = np.clip(wanted, 0.0, last)
@@ -168,24 +169,32 @@ def delayed(values: Samples, samples: float) -> tuple[Samples, Samples]:
     return _hermite(ends, s), -inside * _slope_of_hermite(ends, s)
 
 
-def lagged(
+def lagged_samples(
     values: Float[np.ndarray, "time columns"], samples: float
 ) -> tuple[Float[np.ndarray, "time columns"], Samples]:
-    """`rig.sensor.lagged` of each column, and the derivative of the last one by the number of samples."""
-    from scipy.signal import lfilter
-
+    """`sensor.lagged` of values, column by column, and the derivative of the last one by the number of samples."""
     there = samples > 1e-3
     decay = np.exp(-1.0 / samples) if there else 0.0
     by_decay = decay / samples**2 if there else 0.0
     mean, by_mean = samples * (1.0 - decay), 1.0 - decay - samples * by_decay
-    later, _ = lfilter([1.0 - mean, mean - decay], [1.0, -decay], values, axis=0, zi=mean * values[:1])
+    fed = np.concatenate([values[:1], (1.0 - mean) * values[1:] + (mean - decay) * values[:-1]])
+    later = _decaying(fed, decay)
     last, shown = values[:, -1], later[:, -1]
     change = np.append(0.0, by_decay * shown[:-1] + (by_mean - by_decay) * last[:-1] - by_mean * last[1:])
-    return later, np.asarray(lfilter([1.0], [1.0, -decay], change))
+    return later, _decaying(change, decay)
+
+
+def _decaying(fed: np.ndarray, decay: float) -> np.ndarray:
+    """Y of y[k] = decay · y[k-1] + fed[k], along the first axis."""
+    from scipy.linalg import solve_banded  # `scipy.signal` has filters, and takes half a second to import
+
+    lines = np.ones((2, len(fed)))
+    lines[1] = -decay
+    return np.asarray(solve_banded((1, 0), lines, fed, check_finite=False))
 
 
 def slopes(values: Samples) -> Samples:
-    """`rig.marching.slopes` by NumPy, for a step of one."""
+    """`marching.slopes` by NumPy, for a step of one."""
     if values.size < 5:
         return np.gradient(values)
     inner = (values[:-4] - 8.0 * values[1:-3] + 8.0 * values[3:-1] - values[4:]) / 12.0

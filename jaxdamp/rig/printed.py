@@ -10,17 +10,16 @@ from typing import Generic, NamedTuple, TypeVar
 
 import jax
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float, Int, PyTree
 
 from jaxdamp.codegen import Constant, Signature, Symbols, library, symbols, with_slopes
-from jaxdamp.dampers import laws_inside, margins
-from jaxdamp.identify.model import Model, OnRig, law_of, rig_of
-from jaxdamp.identify.printed_records import MachineNumbers, MachinePlaces, Record
-from jaxdamp.rig import LawNumbers, Rig, gas_and_friction, numbers_of
+from jaxdamp.dampers import AbstractDamper, laws_inside, margins, without_fitted_ranges
+from jaxdamp.rig.machine import Rig, gas_and_friction
+from jaxdamp.rig.printed_records import MachineNumbers, MachinePlaces, Record
 
 
 T = TypeVar("T")
-_LOG = logging.getLogger("jaxdamp.identify.printed")
+_LOG = logging.getLogger("jaxdamp.printed")
 LANES = 4  # derivatives side by side, of which there is a whole number
 _HEAD = """#include <math.h>
 #include <stdint.h>
@@ -59,6 +58,23 @@ void record(const double *p, int64_t count, int64_t parts, const double *x, cons
     }
 }
 """
+_HOLD = """
+void hold(const double *p, int64_t points, const double *v, int64_t count, double *states, double *forces)
+{
+    double ds[STATES + 1][LANES], dF[LANES], before[STATES + 1];
+    force_prepare(p); advance_prepare(p);
+    for (int64_t i = 0; i < points; i++) {
+        double *s = states + i * STATES;
+        for (int64_t step = 0, moves = 1; moves && step < count; step++) {
+            moves = 0;
+            memcpy(before, s, STATES * sizeof *s);
+            advance(p, 0.0, v[i], 0.0, v[i], 1e-3, 0.0, 0.0, 0.0, 0.0, s, ds, 0);
+            for (int m = 0; m < STATES; m++) moves |= !(fabs(s[m] - before[m]) <= 4e-16 * fabs(s[m]));
+        }
+        force(p, 0.0, v[i], 0.0, 0.0, s, (const double (*)[LANES])ds, forces + i, dF, 0);
+    }
+}
+"""
 _CONDITIONS = """
 void conditions(const double *p, double *m, double (*dm)[LANES]) { margins_prepare(p); margins(p, m, dm, 1); }
 """
@@ -78,9 +94,54 @@ def plain_rig() -> Rig:
     return Rig()
 
 
-def numbers_on_rig(model: Model, rig: Rig | None = None) -> LawNumbers:
-    """The numbers of a law on its machine, or on another one if it has none."""
-    return numbers_of(OnRig(law_of(model), rig_of(model) or rig or plain_rig()))
+class LawNumbers(NamedTuple):
+    """A law, or a law on a machine, as plain numbers.
+
+    Attributes:
+        key: its structure, and what of it is no number of a program.
+        tree: how it is put together.
+        others: its leaves, with None in place of arrays of numbers.
+        arrays: the arrays of numbers, in the order of the leaves.
+    """
+
+    key: Hashable
+    tree: PyTree
+    others: tuple[object, ...]
+    arrays: list[np.ndarray]
+
+    def built(self, arrays: Sequence[object]) -> PyTree:
+        """The same with other numbers."""
+        rest = iter(arrays)
+        return jax.tree.unflatten(self.tree, [next(rest) if leaf is None else leaf for leaf in self.others])
+
+    @property
+    def flat(self) -> np.ndarray:
+        """All numbers, as the C functions take them."""
+        return np.concatenate([np.zeros(0), *map(np.ravel, self.arrays)])
+
+
+def is_number(leaf: object) -> bool:
+    """Whether a leaf of a law is an array of numbers that a program takes."""
+    return isinstance(leaf, jax.Array | np.ndarray) and np.issubdtype(leaf.dtype, np.floating)
+
+
+def numbers_of(law: PyTree) -> LawNumbers:
+    """The numbers of a law whose values are known; the range that it was fitted to is left out."""
+    leaves, tree = jax.tree.flatten(without_fitted_ranges(law))
+    others = tuple(None if is_number(leaf) else leaf for leaf in leaves)
+    arrays = [np.asarray(leaf, np.float64) for leaf in leaves if is_number(leaf)]
+    fixed = tuple(np.asarray(leaf).tobytes() if isinstance(leaf, jax.Array) else repr(leaf) for leaf in others)
+    return LawNumbers((tree, fixed, tuple(array.shape for array in arrays)), tree, others, arrays)
+
+
+class _OnRig(NamedTuple):
+    law: AbstractDamper
+    rig: Rig
+
+
+def numbers_on_rig(law: AbstractDamper, rig: Rig | None = None) -> LawNumbers:
+    """The numbers of a law on a machine `rig`, or on one that adds nothing."""
+    return numbers_of(_OnRig(law, rig or plain_rig()))
 
 
 class _Printed(NamedTuple):
@@ -105,20 +166,18 @@ def _functions(numbers: LawNumbers, states: int, conditions: int) -> dict[str, _
     """What is printed of a law on its machine."""
 
     def force(arrays: list[Array], s: Array, x: Array, v: Array) -> Array:
-        law, rig = numbers.built(arrays).law, numbers.built(arrays).rig
-        assert rig is not None
+        law, rig = numbers.built(arrays)
         gas, friction = gas_and_friction(rig, x, v)
         return law.force(x - rig.stroke_offset, v, s) + gas + friction + rig.force_offset
 
     def advance(arrays: list[Array], s: Array, x0: Array, v0: Array, x1: Array, v1: Array, h: Array) -> Array:
-        law, rig = numbers.built(arrays).law, numbers.built(arrays).rig
-        assert rig is not None
+        law, rig = numbers.built(arrays)
         return law.advance(x0 - rig.stroke_offset, v0, x1 - rig.stroke_offset, v1, s, h)
 
     def each(name: str, count: int) -> tuple[list[str], list[str]]:
         return [f"{name}[{i}]" for i in range(count)], [f"d{name}[{i}][k]" for i in range(count)]
 
-    of_conditions = _Printed(lambda arrays, s: margins(numbers.built(arrays)), each("m", conditions))
+    of_conditions = _Printed(lambda arrays, s: margins(numbers.built(arrays).law), each("m", conditions))
     return {
         "begin": _Printed(lambda arrays, s: numbers.built(arrays).law.initial_state(), each("s", states)),
         "force": _Printed(force, (["*F"], ["dF[k]"]), states, ("x", "v")),
@@ -127,16 +186,22 @@ def _functions(numbers: LawNumbers, states: int, conditions: int) -> dict[str, _
 
 
 class PrintedLaw:
-    """The C functions of a structure of a law, and which arrays of its numbers they are differentiated by."""
+    """The C functions of a structure of a law, differentiated by some of its arrays of numbers.
+
+    Arguments:
+        numbers: of the law on its machine.
+        free: places of these arrays among all.
+    """
 
     def __init__(self, numbers: LawNumbers, free: tuple[int, ...]) -> None:
-        self.model = model = numbers.built(numbers.arrays)
+        self._on_rig = numbers.built(numbers.arrays)
+        law = self._on_rig.law
         self.free, shapes = free, [array.shape for array in numbers.arrays]
         self.slopes = sum(numbers.arrays[i].size for i in free)
         self.lanes = LANES * max(-(-self.slopes // LANES), 1)
-        self.states = int(jax.eval_shape(lambda: law_of(model).initial_state()).size)
-        conditional = any(law.has_conditions() for _, law in laws_inside(model))
-        self.conditions = int(jax.eval_shape(lambda: margins(model)).size) if conditional else 0
+        self.states = int(jax.eval_shape(lambda: law.initial_state()).size)
+        conditional = any(part.has_conditions() for _, part in laws_inside(law))
+        self.conditions = int(jax.eval_shape(lambda: margins(law)).size) if conditional else 0
         ends = np.cumsum([0, *(array.size for array in numbers.arrays)])
         rig = numbers.built([int(end) for end in ends[:-1]]).rig  # the place of each number
         self._machine = MachinePlaces(*map(int, (rig.force_delay, rig.moving_mass, rig.force_lag)))
@@ -151,18 +216,20 @@ class PrintedLaw:
         )
         functions = _functions(numbers, self.states, self.conditions)
         text += "".join(each.text(name, shapes, free, delay.size > 0) for name, each in functions.items())
-        self._text = text + _RECORD + _CONDITIONS * bool(self.conditions)
+        self._text = text + _RECORD + _HOLD + _CONDITIONS * bool(self.conditions)
         self._load()
 
     def _load(self) -> None:
         compiled, pointer, whole = library(self._text), ctypes.c_void_p, ctypes.c_int64
-        self._record, self._conditions = compiled.record, getattr(compiled, "conditions", None)
+        self._record, self._hold = compiled.record, compiled.hold
+        self._conditions = getattr(compiled, "conditions", None)
         self._record.argtypes = [pointer, whole, whole, *[pointer] * 8, ctypes.c_double, *[pointer] * 3, whole, pointer]
-        self._record.restype = None
+        self._hold.argtypes = [pointer, whole, pointer, whole, pointer, pointer]
+        self._record.restype = self._hold.restype = None
 
     def __getstate__(self) -> dict[str, object]:
         """For another process, which loads the functions anew."""
-        return {name: value for name, value in self.__dict__.items() if name not in ("_record", "_conditions")}
+        return {name: value for name, value in self.__dict__.items() if name not in ("_record", "_hold", "_conditions")}
 
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
@@ -173,6 +240,21 @@ class PrintedLaw:
         out = np.empty(len(row.force))
         self._record(p.ctypes.data, len(out), *_motion(row), None, None, None, 0, out.ctypes.data)
         return out
+
+    def hold(
+        self, p: Float[np.ndarray, " numbers"], v: Float[np.ndarray, " points"], count: int, states: np.ndarray
+    ) -> Float[np.ndarray, " points"]:
+        """The force [N] after so many milliseconds at constant velocities, or where the states stand still.
+
+        Arguments:
+            p: all numbers.
+            v: the velocities [m/s].
+            count: steps of a millisecond.
+            states: of each point, shape (points, states), which are changed.
+        """
+        forces = np.empty(v.size)
+        self._hold(p.ctypes.data, v.size, v.ctypes.data, count, states.ctypes.data, forces.ctypes.data)
+        return forces
 
     def linearise(
         self, p: np.ndarray, row: Record, column: Int[np.ndarray, " slopes"], out: Float[np.ndarray, "time width"]
@@ -211,7 +293,12 @@ _LOCK = threading.Lock()
 
 
 def printed_law(numbers: LawNumbers, free: set[int] | None) -> PrintedLaw | None:
-    """A law of this structure, differentiated by these arrays at least; any, if None; None where it does not print."""
+    """The C functions of a structure, printed when they are first asked for; None where they cannot be.
+
+    Arguments:
+        numbers: of a law of this structure on its machine.
+        free: arrays by which they are differentiated at least; any will do if None.
+    """
     with _LOCK:
         lock = _locks.setdefault(numbers.key, threading.Lock())
     with lock:
@@ -250,9 +337,13 @@ def _printed() -> list[PrintedLaw]:
 
 
 def remember(laws: Sequence[PrintedLaw]) -> None:
-    """Laws that another process has printed need not be printed here."""
+    """Laws that another process has printed need not be printed here.
+
+    Arguments:
+        laws: of `WithPrinted`.
+    """
     for law in laws:
-        key = numbers_of(law.model).key
+        key = numbers_of(law._on_rig).key
         with _LOCK:
             known = _laws.setdefault(key, [])
             if all(law.free != other.free for other in known):
