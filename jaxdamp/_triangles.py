@@ -24,6 +24,8 @@ def triangle(tall: PyTree) -> PyTree:
     """
     xp: Any = jnp if isinstance(tall, jax.Array) else np
     rows, columns = tall.shape
+    if not columns:
+        return tall[:0]
     by_products = None if isinstance(tall, jax.Array) else _by_products(tall)
     if by_products is not None:
         return by_products
@@ -37,7 +39,7 @@ def _by_products(tall: Float[np.ndarray, "rows columns"]) -> Float[np.ndarray, "
     """The triangle by Cholesky; None where the rounding of the products would be seen."""
     products = tall.T @ tall
     norms = np.sqrt(np.diagonal(products))
-    if tall.dtype != np.float64 or len(tall) < 2 * len(norms) or not (norms > 0.0).all():
+    if tall.dtype != np.float64 or len(tall) < 2 * norms.size or not (norms > 0.0).all():
         return None
     try:
         unit = np.linalg.cholesky(products / norms / norms[:, None])
@@ -68,7 +70,7 @@ def determined(
     """Singular values and directions in which a matrix with columns of length one or zero is not blind."""
     _, singular, directions = np.linalg.svd(triangle(scaled))
     blind = RANK_TOLERANCE if scaled.dtype == np.float64 else RANK_TOLERANCE_SINGLE
-    seen = singular > blind * singular[0]
+    seen = singular > blind * np.max(singular, initial=0.0)
     return singular[seen], directions[: singular.size][seen]
 
 

@@ -54,7 +54,7 @@ gc.set_threshold(1_000_000, 20, 100)
 
 def pytest_configure(config: pytest.Config) -> None:
     """Keep compiled programs between runs: the second run of a test takes half the time of the first."""
-    config.stash[gc_collect_iterations_key] = 2  # at the end, instead of 5 looks through all objects
+    config.stash[gc_collect_iterations_key] = 1  # looks through all objects at the end, which take seconds
     if "JAX_COMPILATION_CACHE_DIR" in os.environ or not hasattr(config, "cache"):
         return
     kept = config.cache.mkdir("programs")

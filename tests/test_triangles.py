@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import _triangles
-from jaxdamp._triangles import triangle
+from jaxdamp._triangles import orthonormal, triangle
 
 
 @pytest.mark.parametrize("left", [1.0, 1e-2, 2e-3, 1e-6, 1e-9])
@@ -27,6 +27,12 @@ def test_most_triangles_take_no_orthogonal_transformations(rng, monkeypatch):
     expected = np.abs(np.linalg.qr(tall)[1])
     monkeypatch.setattr(_triangles.np.linalg, "qr", None)
     np.testing.assert_allclose(np.abs(triangle(tall)), expected, rtol=1e-10, atol=1e-10)
+
+
+def test_no_columns_have_a_triangle_without_rows():
+    """As of a fit all of whose numbers ended at bounds."""
+    assert triangle(np.zeros((3000, 0))).shape == (0, 0)
+    assert orthonormal(np.zeros((3000, 0))).shape == (3000, 0)
 
 
 @pytest.mark.parametrize("odd", [0.0, np.nan, np.inf])

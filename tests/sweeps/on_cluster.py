@@ -49,7 +49,7 @@ def made(i):
     return VirtualDyno(law, force_noise=4.0, sampling_rate=100.0, seed=i).run(SineTest(0.02, 1.0))
 
 
-DAMPERS = DamperRecords(made, range(512))
+DAMPERS = DamperRecords(made, range(256))
 
 
 def start():
@@ -70,7 +70,7 @@ def main(folder: Path, kill: str) -> None:
         workers = list(pids.values())
 
         def told(done: int, _: int) -> None:
-            if done == (128 if kill == "fits" else 4 * BLOCK) and kill != "nobody":
+            if done == (64 if kill == "fits" else 4 * BLOCK) and kill != "nobody":
                 os.kill(workers[0] if kill in ("worker", "fits") else os.getpid(), signal.SIGKILL)
 
         if kill == "point":
