@@ -5,6 +5,7 @@ hundred times longer than the work takes.
 """
 
 import functools
+import os
 import sys
 import threading
 from collections.abc import Iterator
@@ -14,6 +15,11 @@ from typing import Any
 
 _lock = threading.Lock()
 _open: list[Any] = []  # one entry for each fit that runs, the first with the limit to lift
+
+
+def usable_cores() -> int:
+    """The cores on which this process may run: fewer than the machine has, inside a container or by `taskset`."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @functools.cache

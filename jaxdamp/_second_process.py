@@ -22,6 +22,7 @@ from contextlib import contextmanager
 from typing import IO, Generic, TypeAlias, TypeVar, cast
 
 from jaxdamp._forked import started
+from jaxdamp._one_thread import usable_cores
 
 
 T = TypeVar("T")
@@ -255,7 +256,7 @@ def opened(prepare: Callable[[], object]) -> Iterator[None]:
     Arguments:
         prepare: called in each of them at its start, in the time in which this one has nothing to tell it.
     """
-    cores = min(len(os.sched_getaffinity(0)), MOST) if sys.platform == "linux" else 1
+    cores = min(usable_cores(), MOST) if sys.platform == "linux" else 1
     _all[:] = [] if started() else [_forked(prepare) for _ in range(cores - 1)]
     _free[:] = _all
     try:

@@ -11,6 +11,7 @@ import jax
 from jaxdamp import _checks
 from jaxdamp._files import cache_home
 from jaxdamp._forked import started
+from jaxdamp._one_thread import usable_cores
 from jaxdamp.codegen import is_printing, is_printing_vectors
 
 
@@ -74,8 +75,7 @@ def configure(
         ValueError: a number of devices below one.
         RuntimeError: devices or loops would change, but JAX has started.
     """
-    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    devices = usable if cpu_devices is None else cpu_devices
+    devices = usable_cores() if cpu_devices is None else cpu_devices
     if devices < 1:
         _checks.refuse("cpu_devices", "be one or more", devices)
     if started():

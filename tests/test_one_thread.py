@@ -11,7 +11,7 @@ import scipy.linalg
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from jaxdamp import bench
-from jaxdamp._one_thread import one_thread
+from jaxdamp._one_thread import one_thread, usable_cores
 from jaxdamp.bench import velocity
 from jaxdamp.solve import Evaluation, Region, Scaling, SequentialQuadratic
 
@@ -100,3 +100,14 @@ def test_the_steps_of_a_tuning_take_one_thread() -> None:
     start = np.ones(2)
     solver.solve(evaluate, [solver.init(np.zeros(1), start, evaluate(start[None])[0])])
     assert seen[0] == {2} and seen[1:] and all(each == {1} for each in seen[1:]) and threads() == {2}
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="cores are chosen on Linux only")
+def test_cores_that_a_process_may_not_use_do_not_count():
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(before)})
+    try:
+        assert usable_cores() == 1
+    finally:
+        os.sched_setaffinity(0, before)
+    assert usable_cores() == len(before)

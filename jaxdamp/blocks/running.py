@@ -19,6 +19,7 @@ import jax
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._one_thread import usable_cores
 from jaxdamp._progress import Progress, tell
 from jaxdamp.blocks.store import AbstractStore
 
@@ -135,7 +136,7 @@ class _Workers:
         """How many blocks can be computed at a time."""
         threads = getattr(self._cluster, "nthreads", None)
         try:
-            return os.cpu_count() or 1 if threads is None else sum(threads().values())
+            return usable_cores() if threads is None else sum(threads().values())
         except Exception as error:  # what a client raises that has no scheduler depends on how it lost it
             raise RuntimeError(
                 "The client is closed, or its scheduler has ended. Blocks that are done are in the store: make a new "

@@ -2,7 +2,6 @@
 
 import dataclasses
 import functools
-import os
 from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -13,6 +12,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxdamp import _second_process
+from jaxdamp._one_thread import usable_cores
 from jaxdamp._results import AbstractResult
 from jaxdamp._status import Status
 from jaxdamp._tables import Contents
@@ -150,7 +150,7 @@ def side_by_side(
             return fitted(name, start)
 
     beside = _second_process.count()
-    count = 1 + beside if beside else min(os.cpu_count() or 1, MOST_THREADS)
+    count = 1 + beside if beside else min(usable_cores(), MOST_THREADS)
     outcomes = {name: Future[Outcome]() for name in starts}
     left = deque(starts)
 

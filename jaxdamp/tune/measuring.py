@@ -1,6 +1,5 @@
 """What a tuning computes of a vehicle: metrics on one road or over scenarios, in one compiled program."""
 
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple, final
@@ -13,6 +12,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._jacobian import Mode, value_and_jacobian
+from jaxdamp._one_thread import usable_cores
 from jaxdamp._types import Scalar
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.simulation import Ride, moves_axles
@@ -195,7 +195,7 @@ class BatchProgram:
         others = parts[len(first) :]
         if len(others) < 2:
             return [*first, *map(compute, others)]
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
+        with ThreadPoolExecutor(usable_cores()) as pool:
             return [*first, *pool.map(compute, others)]
 
     def _in_lanes(self, designs: Float[np.ndarray, "points free"]) -> list[Array]:
