@@ -220,12 +220,23 @@ def hysteresis(records: Sequence[Record], late: dict[str, float]) -> Pattern:
         values[at, 2 * k], values[at, 2 * k + 1] = rate * (force > 0), rate * (force <= 0)
 
     def words(sizes: np.ndarray) -> str:
-        times = 1e3 * (sizes + sum(late.values()))
-        ends = f"{times.min():.2g} to {times.max():.2g} ms late over records and directions"
-        return f"memory of the damper, whose force is {ends} and so by no delay of a channel"
+        ends = _late_or_early(1e3 * (sizes + sum(late.values())))
+        return (
+            f"memory of the damper, whose force is {ends} over records and directions and so by no delay of a channel"
+        )
 
     remedy = "take a law with memory, such as besinger_series_spring, besinger_lag or series_spring_dahl"
     return Pattern("hysteresis", values, True, words, remedy)
+
+
+def _late_or_early(times: np.ndarray) -> str:
+    """How far times [ms] are from zero, in words."""
+    low, high = float(times.min()), float(times.max())
+    if low >= 0.0:
+        return f"{low:.2g} to {high:.2g} ms late"
+    return (
+        f"{-high:.2g} to {-low:.2g} ms early" if high <= 0.0 else f"between {-low:.2g} ms early and {high:.2g} ms late"
+    )
 
 
 def delayed(motion: Motion, delay: float) -> Values:

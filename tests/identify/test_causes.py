@@ -5,6 +5,7 @@ import pytest
 
 from benchmarks.warnings import ARTEFACTS, Outcome, outcome
 from jaxdamp import bench, dampers, identify
+from jaxdamp.identify import residual_patterns
 from jaxdamp.parameters import parameters
 
 
@@ -70,3 +71,15 @@ def test_causes_over_seeds(artefact):
     if followed:
         before, after = np.mean(followed, axis=0)
         assert after >= before - 0.1
+
+
+@pytest.mark.parametrize(
+    ("times", "words"),
+    [
+        ([0.5, 3.2], "0.5 to 3.2 ms late"),
+        ([-3.8, -0.042], "0.042 to 3.8 ms early"),
+        ([-1.0, 2.0], "between 1 ms early and 2 ms late"),
+    ],
+)
+def test_a_force_is_early_or_late(times, words):
+    assert residual_patterns._late_or_early(np.array(times)) == words
