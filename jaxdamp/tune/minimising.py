@@ -134,7 +134,8 @@ def minimise(
                 break
             tighter = [limit.tightened(excess.get(limit.of, 0.0)) for limit in tighter]
             again_from = descent.search([ended.values / task.space.unit], [ended.evaluation], tighter)
-            ended = _best(descent, again_from, tighter)
+            closer = _best(descent, again_from, tighter)
+            ended = closer._replace(history=ended.history + closer.history)
             others = range(again * fresh_roads, (again + 1) * fresh_roads)
             fresh = _on_fresh_roads(evaluator, (task.space.start, ended.values), others, task.allowed)
         attempts = _attempts(task, starts, several, limits) if len(several) > 1 else ()

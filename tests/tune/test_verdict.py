@@ -189,7 +189,10 @@ def judged_beyond(monkeypatch, limit: float, excess: list[float]) -> list[range]
 def test_a_limit_is_tightened_until_new_roads_keep_it(monkeypatch):
     asked = judged_beyond(monkeypatch, 1.01, [0.03, 0.02, 0.0])
     stiff = presets.quarter_car_000(dampers.Linear(12000.0))
-    result = tune.minimise("working_space_rms", stiff, WHITE, limits={TYRE: "+1%"}, fresh_roads=4)
+    seen: list[float] = []
+    told = {"progress": lambda step, value: seen.append(value), "fresh_roads": 4}
+    result = tune.minimise("working_space_rms", stiff, WHITE, limits={TYRE: "+1%"}, **told)
+    assert list(result.history) == seen and f"after {len(seen)} steps" in result.summary
     assert asked == [range(4), range(4, 8), range(8, 12)]
     assert result.after[TYRE] == pytest.approx(0.95 * 1.01 * result.before[TYRE], rel=1e-4)
 
