@@ -50,9 +50,14 @@ class Limit(NamedTuple):
         """Relative distance to the nearer end, negative beyond it."""
         return min(self.upper - value, value - self.lower) / self.scale
 
-    def tightened(self, by: float) -> "Limit":
-        """The same with ends moved inwards by a share of the scale."""
-        return self._replace(lower=self.lower + by * self.scale, upper=self.upper - by * self.scale)
+    def tightened(self, by: float, value: float) -> "Limit":
+        """The same, with the end nearer to a value inwards by a share of the scale, from the value if that is inside.
+
+        A limit that other roads break need not be reached on this one: moved alone, it would leave all as it is.
+        """
+        if self.upper - value <= value - self.lower:
+            return self._replace(upper=min(self.upper, value) - by * self.scale) if by else self
+        return self._replace(lower=max(self.lower, value) + by * self.scale) if by else self
 
     def nearer(self, value: float) -> str:
         """The nearer end in words, such as "≤ 0.1 m"."""

@@ -128,11 +128,12 @@ def minimise(
         ended, tighter = _best(descent, several, limits), limits
         fresh = _on_fresh_roads(evaluator, (task.space.start, ended.values), range(fresh_roads), task.allowed)
         for again in range(1, TIGHTENED + 1):
-            met = not missed(limits, task.numbers(ended.evaluation.values), task.tolerance)
+            now_reached = task.numbers(ended.evaluation.values)
+            met = not missed(limits, now_reached, task.tolerance)
             excess = lost_limits(fresh, task.allowed) if met else {}
             if not excess:
                 break
-            tighter = [limit.tightened(excess.get(limit.of, 0.0)) for limit in tighter]
+            tighter = [limit.tightened(excess.get(limit.of, 0.0), now_reached[limit.name]) for limit in tighter]
             again_from = descent.search([ended.values / task.space.unit], [ended.evaluation], tighter)
             closer = _best(descent, again_from, tighter)
             ended = closer._replace(history=ended.history + closer.history)

@@ -11,7 +11,7 @@ import pytest
 from jaxdamp import dampers, roads, tune
 from jaxdamp.solve import SequentialQuadratic
 from jaxdamp.tune import Outcome, Rescore, Status, TuneResult, minimising
-from jaxdamp.tune.limits import limit_ranges
+from jaxdamp.tune.limits import Limit, limit_ranges
 from jaxdamp.tune.ranges import Change
 from jaxdamp.tune.verdict import decided, half_interval
 from jaxdamp.vehicles import presets
@@ -195,6 +195,24 @@ def test_a_limit_is_tightened_until_new_roads_keep_it(monkeypatch):
     assert list(result.history) == seen and f"after {len(seen)} steps" in result.summary
     assert asked == [range(4), range(4, 8), range(8, 12)]
     assert result.after[TYRE] == pytest.approx(0.95 * 1.01 * result.before[TYRE], rel=1e-4)
+
+
+def test_a_limit_that_only_other_roads_break_is_tightened_from_the_value_reached(monkeypatch):
+    """A fifth above what the search reaches on its road, it would hold there however often it is tightened alone."""
+    stiff = presets.quarter_car_000(dampers.Linear(12000.0))
+    reached = tune.minimise("working_space_rms", stiff, WHITE, fresh_roads=0).after[TYRE]
+    asked = judged_beyond(monkeypatch, 1.2 * reached, [0.03, 0.0])
+    result = tune.minimise("working_space_rms", stiff, WHITE, limits={TYRE: 1.2 * reached}, fresh_roads=4)
+    assert asked == [range(4), range(4, 8)]
+    assert result.after[TYRE] == pytest.approx((1.0 - 0.03 * 1.2) * reached, rel=1e-4)
+
+
+def test_the_end_of_a_limit_that_is_nearer_is_tightened():
+    limit = Limit("load", "load", 1.0, 3.0, 2.0)
+    assert limit.tightened(0.1, 2.9)[2:4] == pytest.approx((1.0, 2.7))
+    assert limit.tightened(0.1, 1.2)[2:4] == pytest.approx((1.4, 3.0))
+    assert limit.tightened(0.1, 3.4)[2:4] == pytest.approx((1.0, 2.8))
+    assert limit.tightened(0.0, 2.9) == limit
 
 
 def test_combinations_are_those_of_the_tightened_limit(monkeypatch):
