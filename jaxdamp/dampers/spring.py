@@ -15,15 +15,18 @@ class Spring(AbstractStateless):
     """F = k x + f₀: a stiffness parallel to the damper and the force at stroke zero.
 
     For a gas volume over small strokes, an accumulator, elastic seals, or the offset of a load cell. It dissipates no
-    energy. f₀ < 0 pushes the rod out. For the gas pressure over the whole stroke use `GasSpring`.
+    energy. f₀ < 0 pushes the rod out. For the gas pressure over the whole stroke use `GasSpring`. A tuning leaves both
+    numbers alone unless they are named.
 
     >>> law = Spring(stiffness=2000.0, preload=-150.0)
     >>> float(law.force(0.01, 0.0, law.initial_state()))
     -130.0
     """
 
-    stiffness: Number = parameter("N/m", "k, stiffness parallel to the damper", nonnegative, linear=True)
-    preload: Number = parameter("N", "f₀, force at rest at stroke zero", linear=True, default=0.0)
+    stiffness: Number = parameter(
+        "N/m", "k, stiffness parallel to the damper", nonnegative, linear=True, adjustable=False
+    )
+    preload: Number = parameter("N", "f₀, force at rest at stroke zero", linear=True, adjustable=False, default=0.0)
 
     def traits(self) -> Traits:
         """Independent of the velocity."""
