@@ -136,9 +136,9 @@ def test_bad_arguments():
 def test_the_filter_is_that_of_scipy(window, order, derivative, rng):
     """At the ends too, where the polynomial of the last window goes on."""
     values = rng.standard_normal(400)
-    expected = savgol_filter(values, window, order, deriv=derivative)
+    expected = np.asarray(savgol_filter(values, window, order, deriv=derivative))
     ours = savitzky_golay(values, window, order, derivative)
     np.testing.assert_allclose(ours, expected, atol=1e-9 * np.max(np.abs(expected)))
     weights = savitzky_golay_weights(window // 2, order, derivative)[window // 2]
-    coefficients = savgol_coeffs(window, order, deriv=derivative, use="dot")
+    coefficients = np.asarray(savgol_coeffs(window, order, deriv=derivative, use="dot"))
     np.testing.assert_allclose(weights, coefficients, atol=1e-9 * np.max(np.abs(coefficients)))
