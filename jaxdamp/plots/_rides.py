@@ -141,6 +141,13 @@ class Rides:
         return (differ or paths)[:_MOST_DAMPERS]
 
 
+def without_answer(tuned: TuneResult) -> str:
+    """The sentence of the verdict without the answer, which stands above it."""
+    lead, _, rest = tuned.verdict.sentence.partition(": ")
+    said = tuned.verdict.outcome.value.startswith(lead) and rest
+    return _style.first_upper(_style.said(rest)) if said else _style.said(tuned.verdict.sentence)
+
+
 def constant_damping(shown: Rides, comfort: Sequence[str], grip: Sequence[str]) -> tuple[np.ndarray, np.ndarray] | str:
     """The mean metrics of comfort and grip with linear dampers from soft to firm; or why they cannot be driven."""
     assert shown.road is not None

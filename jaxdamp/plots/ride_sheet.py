@@ -38,7 +38,7 @@ def ride_sheet(
         ValueError: no ride, an unknown metric in the limits.
     """
     if isinstance(rides, TuneResult):
-        shown, sentence = _rides.Rides.of_tuning(rides), sentence or _without_answer(rides)
+        shown, sentence = _rides.Rides.of_tuning(rides), sentence or _rides.without_answer(rides)
         good = _style.GOOD if rides.verdict.better else _style.BAD
         answer = {"answer": rides.verdict.outcome.value, "colour": good}
     else:
@@ -72,13 +72,6 @@ def ride_sheet(
             _ride_spectra.gains(last[:2], shown)
             _ride_spectra.comfort(last[2], shown)
     return figure
-
-
-def _without_answer(tuned: TuneResult) -> str:
-    """The sentence of the verdict without the answer, which stands above it."""
-    lead, _, rest = tuned.verdict.sentence.partition(": ")
-    said = tuned.verdict.outcome.value.startswith(lead) and rest
-    return _style.first_upper(_style.said(rest)) if said else tuned.verdict.sentence
 
 
 def _changes(shown: _rides.Rides) -> str:

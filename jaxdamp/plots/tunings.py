@@ -10,6 +10,7 @@ from jaxdamp._traced import equal
 from jaxdamp._types import Artist, Axes, Figure, VectorLike
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.plots import _style, fitted_range
+from jaxdamp.plots._rides import without_answer
 from jaxdamp.plots.rides import default_channels
 from jaxdamp.rig import quasi_static
 from jaxdamp.tune import ParetoFront, TuneResult, limit_spans
@@ -46,7 +47,7 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> Figure:
         gaps += _law(figure.add_subplot(beside[place]), name, pair, points)
     verdict = result.verdict
     colour = _style.GOOD if verdict.better else _style.BAD
-    words = f"{verdict.outcome.value}\n{_style.said(verdict.sentence)}"
+    words = f"{verdict.outcome.value}\n{without_answer(result)}"
     figure.suptitle(words, x=0.01, ha="left", fontsize="medium", color=colour, wrap=True)
     _bars(bars, result)
     _style.note_below(figure, gaps)
