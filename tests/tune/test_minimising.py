@@ -324,6 +324,13 @@ def test_a_tuned_vehicle_that_the_step_does_not_suit_is_noted():
     assert "coarse" in coarse
 
 
+def test_the_elastic_part_of_a_damper_moves_only_if_it_is_named():
+    car = vehicles.presets.quarter_car_000(dampers.Linear(1500.0) + dampers.Spring(1e3, 50.0))
+    for over, moved in ((None, ["damper.terms.0.rate"]), (["stiffness"], ["damper.terms.1.stiffness"])):
+        result = tune.minimise("rms_sprung_acceleration", car, roads.white("C", 20.0), over=over, max_steps=2)
+        assert [change.name for change in result.parameters] == moved
+
+
 def test_a_parameter_without_effect_is_named_and_not_called_optimal():
     car = vehicles.presets.quarter_car_000(dampers.Linear(1500.0) + dampers.Spring(1e3, 50.0))
     both = ["damper.terms.0.rate", "damper.terms.1.preload"]
