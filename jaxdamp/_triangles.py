@@ -19,8 +19,8 @@ _INDEPENDENT = 1e-3  # part of each column, relative to it, that those before le
 def triangle(tall: PyTree) -> PyTree:
     """R of the QR decomposition of a matrix with many rows, NumPy's or JAX's, but for the signs of its rows.
 
-    By the products of the columns, in a tenth of the time, where these are far from depending on each other, so that
-    R is precise to 1e-9; else block by block.
+    By the products of the columns, two to fifteen times as fast, where these are far from depending on each other, so
+    that R is precise to 1e-9 of the length of each column; else block by block.
     """
     xp: Any = jnp if isinstance(tall, jax.Array) else np
     rows, columns = tall.shape

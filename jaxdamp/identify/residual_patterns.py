@@ -250,9 +250,9 @@ def filtered(motion: Motion, lag: float) -> Values:
     force, samples = motion.force, abs(lag) / (motion.time[1] - motion.time[0])
     if samples < 1.0 / SHORT:
         return -lag * np.gradient(force, motion.time)
-    from_rest = lagged_samples(force[:, None], samples)[0][:, 0]
+    settled = lagged_samples(force[:, None], samples)[0][:, 0]  # as if the first force had lasted
     before = samples * (force[1] - force[0])  # the first straight line goes on before the record
-    return from_rest - before * np.exp(-np.arange(force.size) / samples) - force
+    return settled - before * np.exp(-np.arange(force.size) / samples) - force
 
 
 LATE = {"delay": delayed, "lag": filtered}

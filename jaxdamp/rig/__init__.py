@@ -2,13 +2,12 @@
 
 from jaxdamp.rig.constant_velocity import QuasiStatic as QuasiStatic, quasi_static
 from jaxdamp.rig.dynamic_stiffness import DynamicStiffness as DynamicStiffness, dynamic_stiffness
+from jaxdamp.rig.law_numbers import LawNumbers as LawNumbers, is_number as is_number
 from jaxdamp.rig.machine import Readings as Readings, Rig, gas_and_friction as gas_and_friction
 from jaxdamp.rig.marching import Followed as Followed, march as march, solve_law as solve_law
 from jaxdamp.rig.printed import (
-    LawNumbers as LawNumbers,
     PrintedLaw as PrintedLaw,
     WithPrinted as WithPrinted,
-    is_number as is_number,
     numbers_on_rig as numbers_on_rig,
     plain_rig as plain_rig,
     printed_law as printed_law,

@@ -15,7 +15,8 @@ from jaxdamp._field_types import check_module
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import AbstractDamper, coverage
 from jaxdamp.parameters import as_float
-from jaxdamp.rig.printed import is_number, numbers_of, numbers_on_rig, printed_law
+from jaxdamp.rig.law_numbers import is_number, numbers_of
+from jaxdamp.rig.printed import numbers_on_rig, printed_law
 
 
 class QuasiStatic(NamedTuple):

@@ -10,10 +10,11 @@ from typing import Generic, NamedTuple, TypeVar
 
 import jax
 import numpy as np
-from jaxtyping import Array, Float, Int, PyTree
+from jaxtyping import Array, Float, Int
 
 from jaxdamp.codegen import Constant, Signature, Symbols, library, symbols, with_slopes
-from jaxdamp.dampers import AbstractDamper, laws_inside, margins, without_fitted_ranges
+from jaxdamp.dampers import AbstractDamper, laws_inside, margins
+from jaxdamp.rig.law_numbers import LawNumbers, numbers_of
 from jaxdamp.rig.machine import Rig, gas_and_friction
 from jaxdamp.rig.printed_records import MachineNumbers, MachinePlaces, Record
 
@@ -92,46 +93,6 @@ _ARGUMENTS = {
 def plain_rig() -> Rig:
     """A machine that adds nothing, so that a law has the same functions on a machine and without."""
     return Rig()
-
-
-class LawNumbers(NamedTuple):
-    """A law, or a law on a machine, as plain numbers.
-
-    Attributes:
-        key: its structure, and what of it is no number of a program.
-        tree: how it is put together.
-        others: its leaves, with None in place of arrays of numbers.
-        arrays: the arrays of numbers, in the order of the leaves.
-    """
-
-    key: Hashable
-    tree: PyTree
-    others: tuple[object, ...]
-    arrays: list[np.ndarray]
-
-    def built(self, arrays: Sequence[object]) -> PyTree:
-        """The same with other numbers."""
-        rest = iter(arrays)
-        return jax.tree.unflatten(self.tree, [next(rest) if leaf is None else leaf for leaf in self.others])
-
-    @property
-    def flat(self) -> np.ndarray:
-        """All numbers, as the C functions take them."""
-        return np.concatenate([np.zeros(0), *map(np.ravel, self.arrays)])
-
-
-def is_number(leaf: object) -> bool:
-    """Whether a leaf of a law is an array of numbers that a program takes."""
-    return isinstance(leaf, jax.Array | np.ndarray) and np.issubdtype(leaf.dtype, np.floating)
-
-
-def numbers_of(law: PyTree) -> LawNumbers:
-    """The numbers of a law whose values are known; the range that it was fitted to is left out."""
-    leaves, tree = jax.tree.flatten(without_fitted_ranges(law))
-    others = tuple(None if is_number(leaf) else leaf for leaf in leaves)
-    arrays = [np.asarray(leaf, np.float64) for leaf in leaves if is_number(leaf)]
-    fixed = tuple(np.asarray(leaf).tobytes() if isinstance(leaf, jax.Array) else repr(leaf) for leaf in others)
-    return LawNumbers((tree, fixed, tuple(array.shape for array in arrays)), tree, others, arrays)
 
 
 class _OnRig(NamedTuple):
