@@ -189,6 +189,7 @@ def beside(command: str) -> AbstractContextManager[None]:
 def _ready() -> None:
     """What a process does before it is told anything."""
     import jax
+    import matplotlib.backends.backend_agg  # noqa: F401  # which it will draw with
 
     jax.devices()
 

@@ -273,6 +273,7 @@ def _outcome(
         by_setting = fit_scheduled(start, runs, progress=lambda text: None, **how) if scheduled else None
         result = by_setting.result if by_setting else fit(start, runs, **how)
         judged = _judged(start, result, held_out, scheduled)
+        _ = result.error_shares  # which the table needs, computed here beside those of other laws
     except NUMERICAL as error:
         return Failure(name, str(error))
     own = (name, len(result.parameters), result.fit_percent, result.rmse)

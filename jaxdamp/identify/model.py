@@ -1,8 +1,9 @@
 """What explains records: a law, a law on a machine that adds to its force, a vehicle with its sensors."""
 
 import dataclasses
+import functools
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple, TypeVar, final
+from typing import Any, NamedTuple, TypeVar, final
 
 import jax
 import jax.numpy as jnp
@@ -212,7 +213,15 @@ def effects_of(model: Model) -> tuple[str, ...]:
 
 def count_states(model: Model) -> int:
     """How many states the law has; nothing is compiled for that."""
-    return int(jax.eval_shape(lambda: law_of(model).initial_state()).size)
+    leaves, structure = jax.tree.flatten(law_of(model))
+    return _count_states(structure, *map(jax.typeof, leaves))
+
+
+@functools.lru_cache(maxsize=256)
+def _count_states(structure: jax.tree_util.PyTreeDef, *types: Any) -> int:
+    """It is asked ten times in a fit, of laws that differ in their numbers alone."""
+    law: AbstractDamper = structure.unflatten(types)
+    return int(jax.eval_shape(lambda law: law.initial_state(), law).size)
 
 
 def is_memoryless(model: Model) -> bool:

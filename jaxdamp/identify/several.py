@@ -1,8 +1,7 @@
 """Several starts of a search: the best end is the result, the others show further minima.
 
-Compiling a search takes about fifty times as long as running it, so all starts use the same compiled program, one
-after the other. Starts other than the first are searched for a few steps; only the most promising ones are continued
-to their end.
+All starts use the same compiled program, one after the other. Starts other than the first are searched for a few steps;
+only the most promising ones are continued to their end. The few steps see the first part of long records.
 """
 
 from collections.abc import Sequence
@@ -11,11 +10,15 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from jaxdamp._status import Status
 from jaxdamp.dampers import Reach, keeps_conditions, laws_inside
 from jaxdamp.identify.estimates import Minimum
+from jaxdamp.identify.first_part import first_part
+from jaxdamp.identify.printed import evaluator
 from jaxdamp.identify.problem import Problem
-from jaxdamp.identify.search import SearchEnd, Solver, search
+from jaxdamp.identify.search import SearchEnd, Searches, Solver, search
 from jaxdamp.parameters import FreeParameters
+from jaxdamp.solve import BoundedLevenbergMarquardt
 
 
 FIRST_LOOK = 10  # steps after which starts are compared
@@ -61,22 +64,59 @@ def other_starts(free: FreeParameters, reach: Reach) -> list[Float[np.ndarray, "
     return starts
 
 
+class _Searcher:
+    """Searches from several starts: whole ones on all samples, first looks on the first part of long records."""
+
+    def __init__(self, problem: Problem, solver: Solver | None, starts: int | None) -> None:
+        self.problem, self.solver, self._part = problem, solver, None
+        plain = solver is None or isinstance(solver, BoundedLevenbergMarquardt)
+        self._whole = Searches(problem) if plain else None
+        if starts != 1 and self._whole and self._whole.is_printed and (part := first_part(problem)):
+            self._part = self._whole.of(part, evaluator(part.free, part.residuals))
+
+    @property
+    def takes_part(self) -> bool:
+        """Whether a look sees a part of the samples."""
+        return self._part is not None
+
+    def look(self, values: Float[np.ndarray, " free"], steps: int) -> SearchEnd:
+        """The end of a few steps, to be compared with those of other looks; none on a part of the samples is final."""
+        if self._part is None:
+            return self.end(values, steps)
+        return self._part.end(values, steps)._replace(status=Status.STEP_LIMIT)
+
+    def end(self, values: Float[np.ndarray, " free"], steps: int) -> SearchEnd:
+        """The end of a search on all samples."""
+        if self._whole is None:
+            return search(self.problem.started_at(values), steps, solver=self.solver)
+        return self._whole.end(values, steps, solver=self.solver)
+
+    def to_its_end(self, end: SearchEnd, max_steps: int) -> SearchEnd:
+        """The end of a search on all samples that went fewer steps than it may take."""
+        left = max_steps - end.steps
+        if end.converged or left < 1:
+            return end
+        on = self.end(end.values, left)
+        return on._replace(steps=end.steps + on.steps)
+
+
 def search_from(problem: Problem, *, starts: int | None, max_steps: int, solver: Solver | None = None) -> Solution:
     """Search from the start of the problem and from the further starts that its laws propose.
 
     If another start leads to a better end, new proposals are made from there, so that more than one parameter can be
     wrong at the start.
     """
-    best = search(problem, max_steps, solver=solver)
-    ends, tried = [best], [np.asarray(problem.free.values)]
+    searcher, begin = _Searcher(problem, solver, starts), np.asarray(problem.free.values)
+    best = searcher.end(begin, max_steps)
+    ends, tried = [best], [begin]
     for _ in range(ROUNDS):
         if len(tried) == starts or (best.finite and problem.is_rounding(best.squares)):
             break
         others = _not_among(tried, other_starts(problem.free, problem.reach))
         others = others[: None if starts is None else starts - len(tried)]
-        tried, ends = [*tried, *others], [*ends, *_follow(problem, others, best, max_steps, solver)]
+        tried, ends = [*tried, *others], [*ends, *_follow(searcher, others, best, max_steps)]
         before, end = best, _least(ends, best)
-        best = end if end is before else _to_its_end(problem, end, max_steps, solver)
+        best = end if end is before else searcher.to_its_end(end, max_steps)
         ends = [best if one is end else one for one in ends]
         if before.finite and best.squares >= (1.0 - WORTH_A_ROUND) * before.squares:
             break
@@ -124,27 +164,29 @@ def equally_good(squares: float) -> float:
     return ALIKE * max(squares, 1.0)
 
 
-def _follow(
-    problem: Problem, others: Sequence[np.ndarray], best: SearchEnd, max_steps: int, solver: Solver | None
-) -> list[SearchEnd]:
+def _follow(searcher: _Searcher, others: Sequence[np.ndarray], best: SearchEnd, max_steps: int) -> list[SearchEnd]:
     """The ends of a few steps from each of several starts, and of the whole search from the most promising."""
-    looks = [search(problem.started_at(values), min(FIRST_LOOK, max_steps), solver=solver) for values in others]
-    most = PROMISING * min([end.squares for end in (best, *looks) if end.finite], default=np.inf)
+    if not others:
+        return []
+    here, *looks = (searcher.look(values, min(FIRST_LOOK, max_steps)) for values in (best.values, *others))
+    most = PROMISING * min([end.squares for end in (here, *looks) if end.finite], default=np.inf)
     open_ended = (end for end in looks if not end.converged and end.finite and end.squares < most)
     promising = sorted(open_ended, key=lambda end: end.squares)
-    ends = [end for end in looks if end.converged]
+    ends, variance = [end for end in looks if end.converged], here.squares / np.count_nonzero(searcher.problem.used)
     for look in promising[:FOLLOWED]:
-        ends.append(_to_its_end(problem, look, min(max_steps, look.steps + FOLLOWED_STEPS), solver))
+        if here.finite and _apart(look, here) < SAME * variance:
+            ends.append(best)
+            continue
+        # at least one point on all samples
+        most = np.clip(max_steps, look.steps + searcher.takes_part, look.steps + FOLLOWED_STEPS)
+        ends.append(searcher.to_its_end(look, int(most)))
     return ends
 
 
-def _to_its_end(problem: Problem, end: SearchEnd, max_steps: int, solver: Solver | None) -> SearchEnd:
-    """The end of a search that was followed for fewer steps than it may take."""
-    left = max_steps - end.steps
-    if end.converged or left < 1:
-        return end
-    on = search(problem.started_at(end.values), left, solver=solver)
-    return on._replace(steps=end.steps + on.steps)
+def _apart(end: SearchEnd, other: SearchEnd) -> float:
+    """How far apart two ends are: by their sums of squares, and by the force that their parameters differ by."""
+    change = other.jacobian @ (end.values - other.values)
+    return max(end.squares - other.squares, float(change @ change))
 
 
 def minima_of(solution: Solution, names: Sequence[str], variance: float) -> tuple[Minimum, ...]:
@@ -157,8 +199,7 @@ def minima_of(solution: Solution, names: Sequence[str], variance: float) -> tupl
     groups: list[tuple[SearchEnd, int]] = []
     for end in sorted(solution.ends, key=lambda end: (end is not best, end.squares)):
         for i, (other, count) in enumerate(groups):
-            change = other.jacobian @ (end.values - other.values)
-            if max(end.squares - other.squares, float(change @ change)) < SAME * variance:
+            if _apart(end, other) < SAME * variance:
                 groups[i] = (other, count + 1)
                 break
         else:

@@ -10,8 +10,8 @@ import pytest
 
 from jaxdamp import parameters
 from jaxdamp.bench import RandomTest, SineTest, VirtualDyno
-from jaxdamp.dampers import BoucWen, CoulombFriction, Lag, Linear, SeriesSpring
-from jaxdamp.identify import fit, prepare
+from jaxdamp.dampers import BoucWen, CoulombFriction, Lag, Linear, SeriesSpring, Sum
+from jaxdamp.identify import fit, model, prepare
 from jaxdamp.identify.initial_states import Cycle, periodic_state, start_of
 from jaxdamp.identify.predicting import predict_runs
 from jaxdamp.parameters import free_parameters
@@ -19,6 +19,7 @@ from jaxdamp.rig import Rig
 
 
 SLOW_LAG = Lag(Linear(2000.0), 0.5)
+OF_BOTH = Sum((Lag(Linear(2000.0), 0.5), SeriesSpring(Linear(2000.0), 1e6)))
 
 
 def cut_out(law, tests, noise=0.0, sampling_rate=400.0, cycles=2.3):
@@ -115,3 +116,10 @@ def test_what_is_no_periodic_record_is_named(lag_runs):
     assert start_of(random, "periodic") == "warm_up" and start_of(lag_runs[0], "periodic") == "periodic"
     with pytest.raises(ValueError, match="`initial_state` must be one of"):
         prepare(SLOW_LAG, lag_runs, initial_state="steady")
+
+
+def test_states_are_counted_once_for_laws_that_differ_in_their_numbers():
+    assert [model.count_states(law) for law in (Linear(1.0), Lag(Linear(1.0), 0.1), OF_BOTH)] == [0, 1, 2]
+    counted = model._count_states.cache_info().misses
+    assert model.count_states(Lag(Linear(2.0), 0.3)) == jax.jit(model.count_states)(Lag(Linear(3.0), 0.2)) == 1
+    assert model._count_states.cache_info().misses == counted
