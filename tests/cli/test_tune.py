@@ -33,7 +33,6 @@ def _toml(folder: Path, text: str) -> Path:
     return folder / "car.toml"
 
 
-@pytest.mark.pictures
 def test_tune_writes_a_better_law(law: Path, tmp_path: Path) -> None:
     out = tmp_path / "tuned"
     words = [
