@@ -31,7 +31,6 @@ def _written(law: AbstractDamper, path: Path) -> Path:
     return path
 
 
-@pytest.mark.pictures
 def test_ride_compares_a_law_with_a_baseline(law: Path, tmp_path: Path) -> None:
     base, out = _written(Linear(1500.0), tmp_path / "base.json"), tmp_path / "ride"
     words = ["--speed", "16", "--duration", "2", "--dt", "0.002", "--verbose", "--out", out]
