@@ -14,6 +14,7 @@ from pathlib import Path
 
 import jax
 import numpy as np
+import pytest
 from jax._src.interpreters import mlir
 from jaxlib.mlir import ir
 from sybil import Example, Sybil
@@ -105,7 +106,14 @@ class _Blocks(PythonCodeBlockParser):
         self.codeblock_parser = CodeBlockParser("python", _Printing())
 
 
-pytest_collect_file = (
+_collect = (
     Sybil(parsers=[_Blocks(), SkipParser()], patterns=["*.md"], setup=_prepare, teardown=_tidy)
     + Sybil(parsers=[DocTestParser()], patterns=["jaxdamp/**/*.py", "jaxdamp/*.py"], setup=_prepare, teardown=_tidy)
 ).pytest()
+
+
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
+    """Examples of pages and docstrings; a module without one is not parsed, which takes seconds for all."""
+    if file_path.suffix == ".py" and ">>>" not in file_path.read_text(encoding="utf-8"):
+        return None
+    return _collect(file_path, parent)

@@ -1,6 +1,7 @@
 """The storeys of the package: imports only go down, and a package is entered by its front door."""
 
 import ast
+import functools
 import re
 import subprocess
 import sys
@@ -42,6 +43,9 @@ LATE = [
 ]
 
 
+WITH_IMPORTS = ast.stmt | ast.excepthandler | ast.match_case  # no expression has one
+
+
 def storey(part: str) -> int:
     """The storey of a module or package at the top of jaxdamp."""
     if part.startswith("_") and part != "__main__":
@@ -53,10 +57,11 @@ def storey(part: str) -> int:
 
 def imported_modules(source: str, package: list[str]) -> Iterator[tuple[list[str], bool]]:
     """Every import of a source text inside jaxdamp: the parts of its dotted name, and whether a function does it."""
-    tree = ast.parse(source)
-    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
-    inside = {id(node) for function in functions for node in ast.walk(function)}
-    for node in ast.walk(tree):
+    waiting: list[tuple[ast.AST, bool]] = [(ast.parse(source), False)]
+    while waiting:
+        node, late = waiting.pop()
+        late |= isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        waiting += [(inner, late) for inner in ast.iter_child_nodes(node) if isinstance(inner, WITH_IMPORTS)]
         if isinstance(node, ast.Import):
             names = [alias.name.split(".") for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -65,9 +70,10 @@ def imported_modules(source: str, package: list[str]) -> Iterator[tuple[list[str
             names = [[*base, alias.name] for alias in node.names]
         else:
             continue
-        yield from ((name, id(node) in inside) for name in names if name[0] == "jaxdamp")
+        yield from ((name, late) for name in names if name[0] == "jaxdamp")
 
 
+@functools.cache
 def public_names(part: str) -> set[str] | None:
     """What a package hands to the others, `__all__` and `X as X` of its `__init__`; None of a single module."""
     door = ROOT / part / "__init__.py"

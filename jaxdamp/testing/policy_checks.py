@@ -142,16 +142,20 @@ def check_derivatives(policy: Policy) -> None:
     weights = jnp.asarray(np.cos(np.arange(SAMPLES) + 0.5), float)
 
     @jax.jit
-    def of(point: tuple[Numbers, Signals]) -> Array:
-        return _demands(flat.build(point[0]), point[1])
+    def derived(point: tuple[Numbers, Signals]) -> tuple[Array, Array, tuple[Numbers, Signals]]:
+        def of(point: tuple[Numbers, Signals]) -> Array:
+            return _demands(flat.build(point[0]), point[1])
+
+        value, pull = jax.vjp(of, point)
+        return value, jax.jvp(of, (point,), (way,))[1], pull(weights)[0]
 
     at = (flat.numbers, signals)
-    along = np.asarray(jax.jvp(of, (at,), (way,))[1])
-    (back,) = jax.vjp(of, at)[1](weights)
+    along, back = derived(at)[1:]
+    along = np.asarray(along)
     found = sum(float(jnp.vdot(a, b)) for a, b in zip(jax.tree.leaves(back), jax.tree.leaves(way), strict=True))
     message = "Forward and reverse derivatives must agree."
     require_equal(found, along @ np.asarray(weights), message, rtol=1e-8, atol=1e-9 * size)
-    ends = (of(jax.tree.map(lambda a, b, s=sign: a + s * 1e-5 * b, at, way)) for sign in (1.0, -1.0))
+    ends = (derived(jax.tree.map(lambda a, b, s=sign: a + s * 1e-5 * b, at, way))[0] for sign in (1.0, -1.0))
     up, down = map(np.asarray, ends)
     message = "Derivatives and differences must agree, sample by sample: demands must be smooth."
     require_equal(along, (up - down) / 2e-5, message, rtol=1e-5, atol=1e-6 * size)
@@ -172,7 +176,7 @@ def check_single_precision(policy: Policy) -> None:
     expected = np.asarray(_answers(policy, _signals())[0])
     with jax.enable_x64(False):
         single = jax.tree.map(lambda y: jnp.asarray(np.asarray(y)) if eqx.is_array(y) else y, policy)
-        found = _answers(single, _signals())[0]
+        found = eqx.filter_jit(_demands)(single, _signals())
         require(found.dtype == jnp.float32, f"Demands are {found.dtype} where all numbers are of single precision.")
     message = "In single precision demands must be the same."
     require_equal(found, expected, message, atol=1e-4 * _largest(expected))

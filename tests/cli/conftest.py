@@ -1,29 +1,19 @@
-import io
 from pathlib import Path
 
-import matplotlib.figure
 import pytest
 
 from jaxdamp import bench
 from jaxdamp.bench import BenchSet, SineTest
 from jaxdamp.dampers import Bilinear
-from jaxdamp.report import drawing
+
+from .invoking import draw_nothing
 
 
 @pytest.fixture(autouse=True)
 def pictures_where_looked_at(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Drawing takes half the time of a command: figures are made in all tests, drawn in `pictures` and long ones."""
-    if any(request.node.get_closest_marker(kind) for kind in ("pictures", "slow", "exhaustive")):
-        return
-    blank = drawing.png(matplotlib.figure.Figure(figsize=(0.1, 0.1)))
-    monkeypatch.setattr(drawing, "png", lambda figure: blank)
-    monkeypatch.setattr(matplotlib.figure.Figure, "savefig", not_drawn)
-
-
-def not_drawn(figure: matplotlib.figure.Figure, target: str | Path | io.BytesIO, **_: object) -> None:
-    """A file without a picture."""
-    if not isinstance(target, io.BytesIO):
-        Path(target).write_bytes(b"")
+    if not any(request.node.get_closest_marker(kind) for kind in ("pictures", "slow", "exhaustive")):
+        draw_nothing(monkeypatch)
 
 
 @pytest.fixture(scope="session")

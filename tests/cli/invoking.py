@@ -1,10 +1,15 @@
 """The command line, called as a user does."""
 
+import functools
+import io
 from pathlib import Path
 
+import matplotlib.figure
+import pytest
 from typer.testing import CliRunner, Result
 
 from jaxdamp.cli import app
+from jaxdamp.report import drawing
 
 
 def jaxdamp(*words: str | Path, code: int = 0) -> Result:
@@ -20,3 +25,21 @@ def refused(folder: Path, *words: str | Path) -> str:
     assert "Traceback" not in output
     assert sorted(folder.rglob("*")) == before
     return output
+
+
+@functools.cache
+def _blank() -> bytes:
+    return drawing.png(matplotlib.figure.Figure(figsize=(0.1, 0.1)))
+
+
+def draw_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From here on files of pictures are empty."""
+    blank = _blank()
+    monkeypatch.setattr(drawing, "png", lambda figure: blank)
+    monkeypatch.setattr(matplotlib.figure.Figure, "savefig", not_drawn)
+
+
+def not_drawn(figure: matplotlib.figure.Figure, target: str | Path | io.BytesIO, **_: object) -> None:
+    """A file without a picture."""
+    if not isinstance(target, io.BytesIO):
+        Path(target).write_bytes(b"")

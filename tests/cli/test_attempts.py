@@ -33,7 +33,6 @@ def test_a_law_that_cannot_be_started_or_fitted_is_named_and_the_others_are_comp
     assert rows[3].endswith(",failed")
 
 
-@pytest.mark.pictures
 def test_laws_and_tables_are_in_place_whatever_the_pictures_do(
     records: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -134,7 +134,6 @@ def test_settings_in_names_are_not_pooled(tmp_path: Path) -> None:
     assert 1500.0 < from_json(tmp_path / "pooled" / "best_law.json").rebound_rate < 2500.0
 
 
-@pytest.mark.pictures
 def test_settings_stated_on_the_command_line(folder: Path, tmp_path: Path) -> None:
     words = ("--command", "*_1Hz=1,*_2Hz=2,*_4Hz=2,clipped=3", "--velocities", "0.03,0.05")
     text = jaxdamp("bench", folder, *words, "--keep-rest", "--out", tmp_path / "out").output

@@ -31,7 +31,6 @@ def _written(law: AbstractDamper, path: Path) -> Path:
     return path
 
 
-@pytest.mark.pictures
 def test_ride_compares_a_law_with_a_baseline(law: Path, tmp_path: Path) -> None:
     base, out = _written(Linear(1500.0), tmp_path / "base.json"), tmp_path / "ride"
     words = ["--speed", "16", "--duration", "2", "--dt", "0.002", "--verbose", "--out", out]
@@ -69,7 +68,6 @@ def test_wrong_words_are_refused(law: Path, tmp_path: Path, words: list[str], me
     assert message in refused(tmp_path, "ride", *words, "--start", law, "--out", tmp_path / "out")
 
 
-@pytest.mark.pictures
 def test_a_controller_is_compared_with_the_law_at_its_own_command(tmp_path: Path) -> None:
     damper = Scheduled((Linear(1000.0), Linear(6000.0)), levels=[0.0, 1.0], command=0.25)
     words = ["--controller", "skyhook:gain=3000,lead=0.01", "--delay", "0.002", "--actuator-lag", "0.003"]

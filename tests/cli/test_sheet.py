@@ -7,7 +7,7 @@ import pytest
 
 from jaxdamp.export import from_json
 
-from .invoking import jaxdamp, refused
+from .invoking import draw_nothing, jaxdamp, refused
 
 
 @pytest.fixture
@@ -34,6 +34,7 @@ def test_a_sheet_becomes_a_family_and_a_best_click(sheet: Path, monkeypatch: pyt
         and (folder / "fit/family.png").is_file()
         and (folder / "fit/laws/3.json").is_file()
     )
+    draw_nothing(monkeypatch)
     ride = ("quarter_car_000", "iso:A", "--start", folder / "fit/best_law.json", "--duration", "1")
     few = ("--fresh-roads", "2")
     said = " ".join(jaxdamp("tune", *ride, *few, "--limit", "grip=+20%", "--out", folder / "tune").output.split())

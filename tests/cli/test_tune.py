@@ -33,7 +33,6 @@ def _toml(folder: Path, text: str) -> Path:
     return folder / "car.toml"
 
 
-@pytest.mark.pictures
 def test_tune_writes_a_better_law(law: Path, tmp_path: Path) -> None:
     out = tmp_path / "tuned"
     words = [
@@ -108,7 +107,6 @@ def test_a_limit_that_is_not_met_ends_with_an_exit_code(tmp_path: Path) -> None:
     assert "is not met" in jaxdamp("tune", "quarter_car_000", "white:C", *words, code=1).output
 
 
-@pytest.mark.pictures
 def test_sweep_of_a_vehicle_from_a_file_writes_a_table_and_pictures(law: Path, tmp_path: Path) -> None:
     to_json(vehicles.presets.half_car_002(), tmp_path / "car.json")
     words = [

@@ -173,10 +173,8 @@ LAWS = {
     "neural hysteresis": network,
     "hybrid": lambda: Hybrid(PiecewiseLinear([-0.1, 0.1], [700.0, 2000.0, 900.0], 0.02), network(1)),
     "spring": lambda: Linear(900.0) + Spring(2000.0),
-    "scheduled": lambda: Scheduled((BoucWen(400.0, 0.0, 50.0, 1e-3), BoucWen(900.0, 0.0, 600.0, 2e-3)), [0, 2], 0.7),
-    "schedule of forces": lambda: Scheduled(
-        (Linear(900.0), BoucWen(900.0, 0.0, 600.0, 2e-3)), [0, 2], 0.7, blend="force"
-    ),
+    "scheduled": lambda: Scheduled((Dahl(5e4, 50.0), Dahl(3e5, 600.0)), [0, 2], 0.7),
+    "schedule of forces": lambda: Scheduled((Linear(900.0), Dahl(3e5, 600.0)), [0, 2], 0.7, blend="force"),
     "lag of a schedule": lambda: Lag(Scheduled((slopes(0.02), slopes(0.02)), [0, 1], 0.3), 0.003),
     "spline table": lambda: SplineTable(
         [-1.1, -0.4, -0.1, 0.0, 0.05, 0.3, 1.0], [-1400.0, -1350.0, -450.0, 0.0, 300.0, 1500.0, 2900.0]

@@ -188,9 +188,8 @@ def test_a_sheet_says_the_verdict_that_the_result_has(comparison: Comparison, tu
 
 @contextlib.contextmanager
 def laid_out(figure: Figure) -> Iterator[None]:
-    """A figure whose axes stay where its layout puts them, however often it is drawn."""
+    """A figure that was drawn, whose axes stay where its layout put them, however often it is drawn again."""
     engine = figure.get_layout_engine()
-    figure.draw_without_rendering()
     figure.set_layout_engine("none")
     yield
     figure.set_layout_engine(engine)
@@ -238,6 +237,7 @@ def golden(name: str) -> Image.Image:
     return Image.open(GOLDEN / f"{name.replace(' ', '_')}.png")
 
 
+@pytest.mark.usefixtures("printed_in_each")
 def test_the_pictures_are_drawn_as_before(figures: dict[str, Figure]) -> None:
     """`JAXDAMP_REDRAW=1 pytest tests/plots/test_house_style.py` draws the golden pictures anew: look at each."""
     for name, figure in figures.items():
@@ -256,7 +256,9 @@ def test_the_pictures_are_drawn_as_before(figures: dict[str, Figure]) -> None:
     assert all(path.stat().st_size <= 20_000 for path in files)
 
 
+@pytest.mark.usefixtures("printed_in_each")
 @pytest.mark.parametrize("name", ["curves", "ride", "damper use", "law card", "ride sheet", "damper sheet", "tuning"])
+@pytest.mark.exhaustive_cases("ride", "damper use", "damper sheet")  # as others of one panel, of several, of a page
 def test_a_curve_that_is_missing_or_has_another_colour_is_noticed(name: str, figures: dict[str, Figure]) -> None:
     blue = _style.AFTER["color"]
     lines = [line for axes in figures[name].axes for line in axes.get_lines() if line.get_color() == blue]

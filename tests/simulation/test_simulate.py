@@ -68,7 +68,7 @@ def test_energy_error_falls_with_the_square_of_the_step(name, tyre_damping):
     assert errors[0] > 3.3 * errors[1] > 3.3 * 3.3 * errors[2]
 
 
-@pytest.mark.exhaustive_cases("linear", "besinger", "bilinear", "motion ratio", "series spring")
+@pytest.mark.exhaustive_cases("linear", "besinger", "bilinear", "lag", "motion ratio", "series spring")
 def test_the_two_engines_agree(run):
     reference = simulate(run.vehicle, BUMP, duration=1.0, engine=Adaptive())
     for channel, share in (("sprung_acceleration", 6e-3), ("stroke", 1e-3), ("dynamic_tyre_load", 1e-3)):

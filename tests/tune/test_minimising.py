@@ -132,9 +132,8 @@ def test_bounds_hold_and_are_said():
 def test_slopes_of_a_curve_are_tuned_and_many_at_bounds_are_counted():
     law = dampers.PiecewiseLinear(knots=[-0.2, 0.2], slopes=[900.0, 1500.0, 1200.0])
     car = vehicles.presets.quarter_car_000(law)
-    result = tune.minimise(
-        "rms_dynamic_tyre_load", car, roads.white("C", 20.0), bounds={"damper.slopes": (850.0, 1510.0)}
-    )
+    bump, bounds = roads.cosine_bump(0.1, start=0.05, duration=0.2), {"damper.slopes": (850.0, 1510.0)}
+    result = tune.minimise("rms_dynamic_tyre_load", car, bump, duration=0.5, bounds=bounds)
     assert {change.name.partition("[")[0] for change in result.parameters} == {"damper.slopes"}
     (warning,) = [text for text in result.warnings if "bound" in text]
     assert warning.startswith("3 parameters ended at their bounds: 3 of damper.slopes (as given).")
