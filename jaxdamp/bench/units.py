@@ -4,15 +4,12 @@ import re
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from jaxdamp._checks import ArgumentError, Setting
+from jaxdamp._unit_registry import unit_registry
 
-
-if TYPE_CHECKING:
-    import pint
 
 SI = {"time": "s", "stroke": "m", "velocity": "m/s", "force": "N", "temperature": "K", "command": "A"}
 COMMAND_UNITS = ("A", "V", "%")  # of a command that is measured: a coil current, a voltage, a duty cycle
@@ -90,13 +87,6 @@ _COMMANDS = {
 }
 
 
-@lru_cache(maxsize=1)
-def _registry() -> "pint.UnitRegistry":
-    import pint
-
-    return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
-
-
 @lru_cache(maxsize=256)
 def conversion(role: str, written: str) -> Conversion | None:
     """How to bring a column with this unit to SI, or None if this is no unit of that quantity.
@@ -119,7 +109,7 @@ def conversion(role: str, written: str) -> Conversion | None:
     if any(text in units for units in _KNOWN.values()):
         factor = _KNOWN.get(role, {}).get(text)
         return None if factor is None else Conversion(text, factor)
-    registry = _registry()  # not within `try`: that it does not start says nothing of the text
+    registry = unit_registry()  # not within `try`: that it does not start says nothing of the text
     try:
         unit = registry.Unit(text)
         zero, one, two = (registry.Quantity(x, unit).to(SI[role]).magnitude for x in (0.0, 1.0, 2.0))
@@ -160,7 +150,7 @@ def ratio(written: str, other: str) -> float | None:
     one, two = (next((units for units in _KNOWN.values() if text in units), {}) for text in (written, other))
     if one and two:
         return one[written] / two[other] if one is two else None
-    registry = _registry()
+    registry = unit_registry()
     try:
         return float(registry.Quantity(1.0, written.strip()).to(other.strip()).magnitude)
     except Exception:  # as in `conversion`

@@ -19,6 +19,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._unit_registry import unit_registry
 from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.export._c_text import controller_source, law_source, vehicle_source
@@ -177,9 +178,7 @@ def _structure(structure: ET.Element, known: list[Variable]) -> None:
 
 def _units(definitions: ET.Element, units: set[str]) -> None:
     """Units with their powers of SI base units."""
-    import pint
-
-    registry: Any = pint.UnitRegistry()
+    registry: Any = unit_registry()
     for unit in sorted(units):
         base = registry.Quantity(1.0, unit).to_base_units()
         entry = ET.SubElement(definitions, "Unit", {"name": unit})

@@ -1,33 +1,19 @@
 """Checks of the declarations of a law: shapes, refusals, parameters, text, file, traits."""
 
-import functools
-from typing import TYPE_CHECKING
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jaxtyping
 import numpy as np
 
+from jaxdamp._unit_registry import unit_registry
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.export import from_json, to_json
 from jaxdamp.parameters import free_parameters, get, parameters, replace
 from jaxdamp.testing._probes import motion, points, require, require_equal, require_refusal, responses
 
 
-if TYPE_CHECKING:
-    import pint
-
-
 REFUSALS = (ValueError, TypeError, jaxtyping.TypeCheckError)
-
-
-@functools.cache
-def _units() -> "pint.UnitRegistry":
-    """Half a second, once for all laws."""
-    import pint
-
-    return pint.UnitRegistry()
 
 
 def check_shapes(law: AbstractDamper) -> None:
@@ -68,7 +54,7 @@ def check_parameters(law: eqx.Module) -> None:
     """Each parameter has a unit that can be read, a meaning and a domain that is enforced."""
     import pint
 
-    units, table = _units(), parameters(law)
+    units, table = unit_registry(), parameters(law)
     require(table, "It has no parameters: declare its numbers with `parameter(unit, meaning, domain)`.")
     for p in table:
         require(p.meaning.strip() and "\n" not in p.meaning, f"`{p.path}` must have a meaning, one line of text.")

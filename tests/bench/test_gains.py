@@ -69,10 +69,10 @@ def test_a_broken_library_of_units_is_no_unknown_unit(monkeypatch: pytest.Monkey
         raise TypeError("cannot inherit frozen dataclass from a non-frozen one")
 
     monkeypatch.setattr("pint.UnitRegistry", broken)
-    units._registry.cache_clear()
+    units.unit_registry.cache_clear()
     try:
         for convert in (lambda: units.conversion("force", "hectonewton"), lambda: units.ratio("hectovolt", "V")):
             with pytest.raises(TypeError, match="frozen dataclass"):
                 convert()
     finally:
-        units._registry.cache_clear()
+        units.unit_registry.cache_clear()
