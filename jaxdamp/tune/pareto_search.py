@@ -9,6 +9,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
+from jaxdamp._settings import completed
 from jaxdamp._status import Status
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, current_name
@@ -22,7 +23,7 @@ from jaxdamp.tune.ranges import SearchRange, start_points
 from jaxdamp.tune.rescoring import other_roads
 from jaxdamp.tune.result import V
 from jaxdamp.tune.scenarios import Road, Scenarios
-from jaxdamp.tune.settings import DEFAULTS, Settings, completed
+from jaxdamp.tune.settings import DEFAULTS, Settings
 from jaxdamp.tune.task import DesignTask, Evaluator, check_call
 from jaxdamp.tune.tracing import NO_CONFLICT, FrontProblem, lattice, range_of, trace_front
 from jaxdamp.tune.verdict import missed_notes

@@ -8,6 +8,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._settings import completed
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric
 from jaxdamp.parameters import match_paths
@@ -17,7 +18,7 @@ from jaxdamp.tune.result import ToleranceEffect, TuneResult, V
 from jaxdamp.tune.scenario_ride import Risk
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.sensitivities import sensitivity
-from jaxdamp.tune.settings import RUN, Run, Settings, completed
+from jaxdamp.tune.settings import RUN, Run, Settings
 from jaxdamp.vehicles import AbstractVehicle
 
 

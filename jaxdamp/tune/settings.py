@@ -1,8 +1,7 @@
 """The settings of tunings: what may change and within which limits, how it is driven, how it is searched."""
 
-import difflib
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeAlias, TypedDict
+from typing import TypedDict
 
 from jaxdamp.metrics import Metric
 from jaxdamp.simulation import AbstractEngine
@@ -89,20 +88,9 @@ class Settings(Design, Run, Search, total=False):
     """All keywords that `minimise`, `pareto` and `robust` have in common: those of `Design`, `Run` and `Search`."""
 
 
-RUN = Run(duration=None, dt=None, engine=None)
-Asked: TypeAlias = dict[str, Any]  # completed settings, each of its own type
+RUN: Run = {"duration": None, "dt": None, "engine": None}
 DEFAULTS: Settings = {
     "over": None, "freeze": (), "bounds": None, "tie": None, "limits": None, "shape": (), "metrics": (), **RUN,
     "starts": 1, "seed": 0, "max_steps": 100, "fresh_roads": 32,
 }  # fmt: skip
 LEAST = {"points": 1, "between": 0, "starts": 1, "seed": 0, "max_steps": 1, "fresh_roads": 0}  # of the counts
-
-
-def completed(call: str, given: Mapping[str, object], defaults: Mapping[str, object]) -> Asked:
-    """Settings with the defaults of a call."""
-    for name in given:
-        if name not in defaults:
-            near = difflib.get_close_matches(name, defaults, 1)
-            hint = f"did you mean {near[0]!r}?" if near else f"it has {', '.join(defaults)}."
-            raise TypeError(f"{call} has no argument {name!r}: {hint}")
-    return {**defaults, **given}
