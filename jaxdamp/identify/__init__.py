@@ -7,12 +7,7 @@ from jaxdamp.identify.comparing import Comparison as Comparison, compare, fit_ea
 from jaxdamp.identify.control_charts import AbstractChart as AbstractChart, Cusum, Ewma, Shewhart
 from jaxdamp.identify.cross_validation import CrossValidation as CrossValidation, cross_validate
 from jaxdamp.identify.design_goal import MachineLimits
-from jaxdamp.identify.designing import (
-    DesignSettings as DesignSettings,
-    ExperimentDesign as ExperimentDesign,
-    design_experiment,
-    extent as extent,
-)
+from jaxdamp.identify.designing import ExperimentDesign as ExperimentDesign, design_experiment, extent as extent
 from jaxdamp.identify.estimates import Estimate as Estimate, rounded as rounded
 from jaxdamp.identify.fitting import fit, solve
 from jaxdamp.identify.judging import judge
@@ -55,15 +50,13 @@ from jaxdamp.identify.settings import (
     FitSettings,
     Free as Free,
     ManySettings as ManySettings,
-    ProblemSettings as ProblemSettings,
     Records as Records,
-    ScheduledSettings as ScheduledSettings,
     Search as Search,
     TargetSettings as TargetSettings,
     VehicleSettings as VehicleSettings,
 )
 from jaxdamp.identify.targets import TargetFit as TargetFit, fit_targets
-from jaxdamp.identify.training import Training as Training, TrainSettings as TrainSettings, train
+from jaxdamp.identify.training import Training as Training, train
 from jaxdamp.identify.vehicle_comparing import (
     VehicleComparison as VehicleComparison,
     VehicleRung as VehicleRung,

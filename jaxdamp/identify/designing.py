@@ -21,7 +21,6 @@ from jaxdamp.rig import Rig
 
 CRITERIA = ("D", "A", "c")
 FINER = (1.25, 1.08)  # ratios of stroke and frequency of the tests around the chosen ones
-FURTHER = "limits", "runs", "force_noise", "rig", "criterion", "function", "programme"  # arguments of other names
 WEAK = 0.5  # standard error, relative to the value, above which a parameter is not identifiable
 
 
@@ -207,11 +206,10 @@ def design_experiment(
     >>> max(design.standard_errors.values()) < 10.0
     True
     """
-    asked = completed("design_experiment", settings, DEFAULTS, *FURTHER)
+    asked = completed(design_experiment, settings, DEFAULTS)
     tests, duration = asked["tests"], asked["duration"]
     _check(limits, tests, runs, force_noise, criterion, function)
-    how = {"rig": rig, "freeze": asked["freeze"], "tie": asked["tie"], "force_noise": force_noise}
-    how["sampling_rate"] = asked["sampling_rate"]
+    how = {"rig": rig, "force_noise": force_noise} | {name: asked[name] for name in ("freeze", "tie", "sampling_rate")}
     if tests is not None:
         candidates: dict[Any, Excitation] = dict(enumerate(tests))
     else:

@@ -168,7 +168,7 @@ def fit(
     >>> abs(result["rebound_rate"].value - 2600.0) < 4 * result["rebound_rate"].standard_error
     True
     """
-    asked = completed("fit", settings, FIT, "rig")
+    asked = completed(fit, settings, FIT)
     loss, force_noise, starts = asked["loss"], asked["force_noise"], asked["starts"]
     _checks.one_of("loss", loss, LOSSES)
     if force_noise is not None:

@@ -43,7 +43,6 @@ from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, SearchLanes,
 
 
 STARTED_FROM = 12  # dampers whose records give the start of a law class
-FURTHER = "rig", "shared", "settings", "file", "cluster", "progress"  # arguments with names of their own
 
 
 @of_known_numbers
@@ -104,7 +103,7 @@ def fit_many(
     >>> round(float(many.law_at(1.5).rebound_rate), -1)
     2150.0
     """
-    how: Options = {"rig": rig, **completed("fit_many", options, MANY, *FURTHER)}
+    how: Options = {"rig": rig, **completed(fit_many, options, MANY)}
     _checks.one_of("weighting", how["weighting"], ["samples", "runs"])
     _checks.one_of("loss", how["loss"], LOSSES)
     _checks.one_of("initial_state", how["initial_state"], INITIAL_STATES)

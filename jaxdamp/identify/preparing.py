@@ -68,7 +68,7 @@ def prepare(
     >>> round(float(judge(problem, solve(problem)).law.rate), 3)
     1500.0
     """
-    asked = completed("prepare", settings, PROBLEM, "rig")
+    asked = completed(prepare, settings, PROBLEM)
     _checks.one_of("initial_state", asked["initial_state"], INITIAL_STATES)
     _checks.untraced("law", law, FIT_OUTSIDE)
     runs = _records(runs)

@@ -193,7 +193,7 @@ def fit_scheduled(
     >>> identify.fit_scheduled(dampers.Linear, runs).between[0].fit_percent > 95.0
     True
     """
-    asked = completed("fit_scheduled", settings, SCHEDULED, "rig")
+    asked = completed(fit_scheduled, settings, SCHEDULED)
     blend, progress, bad_records = asked["blend"], asked["progress"], asked["bad_records"]
     runs = usable(settings_stated(as_runs(runs, call=CALL)), bad_records, robust=asked["loss"] != "squares")
     if bad_records != "keep":

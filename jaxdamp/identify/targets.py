@@ -171,7 +171,7 @@ def fit_targets(
     >>> [(target.name, round(target.value, 4), target.met) for target in result.targets]
     [('frequency', 1.2, True), ('damping ratio', 0.3, True)]
     """
-    asked = completed("fit_targets", settings, TARGETS, "tolerance")
+    asked = completed(fit_targets, settings, TARGETS)
     goals = _goals(targets, tolerance)
     loss, starts, priors, max_steps = asked["loss"], asked["starts"], asked["priors"] or {}, asked["max_steps"]
     _checks.one_of("loss", loss, LOSSES)

@@ -156,8 +156,8 @@ def train(
         patience: number of steps without a decrease of the held-out error after which the training stops.
         learning_rate: initial learning rate of Adam; it decreases to a hundredth along a cosine over `steps`.
         optimiser: any optax optimiser instead.
-        settings: keywords of `fit`, all optional: `freeze`, `tie`, `weighting`, and `samples_per_cycle`, 200 if left out
-            (see `TrainSettings`).
+        settings: keywords of `fit`, all optional: `freeze`, `tie`, `weighting`, and `samples_per_cycle`, 200 if left
+            out (see `TrainSettings`).
 
     Raises:
         ValueError: no records on either side, a record on both; a law without finite forces; names that fit no
@@ -171,7 +171,7 @@ def train(
     >>> trained.held_out_fit_percent > 90.0
     True
     """
-    asked = completed("train", settings, TRAIN, "rig", "steps", "patience", "learning_rate", "optimiser")
+    asked = completed(train, settings, TRAIN)
     runs, held_out = as_runs(runs, call="train(law, runs, held_out=...)"), as_runs(held_out, "held_out")
     _check(runs, held_out, steps, patience)
     _checks.positive("learning_rate", learning_rate)

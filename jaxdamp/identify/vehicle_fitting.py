@@ -105,7 +105,7 @@ def fit_vehicle(
 
     `docs/vehicle_fits.md` shows an example.
     """
-    asked = completed("fit_vehicle", settings, VEHICLE, "sensors", "bench", "rig", "start", "settling", "noise")
+    asked = completed(fit_vehicle, settings, VEHICLE)
     check_module("vehicle", vehicle, (AbstractVehicle,), "fit_vehicle(vehicle, records)")
     over, freeze, bounds, per_record = asked["over"], asked["freeze"], asked["bounds"], asked["per_record"]
     loss, priors = asked["loss"], asked["priors"] or {}

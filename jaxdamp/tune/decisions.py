@@ -184,7 +184,7 @@ def compare_dampers(
     >>> round(compared.difference("rms_sprung_acceleration").change, 2)
     -8.68
     """
-    driven = completed("compare_dampers", run, RUN)
+    driven = completed(compare_dampers, run, RUN)
     _check(dampers, vehicle, roads)
     listed = [roads] if isinstance(roads, WhiteRoad) else list(roads)
     by_damper, warnings, units, first = {}, [], {}, None

@@ -112,7 +112,7 @@ def minimise(
     >>> bounded.parameters[0].note
     'at its upper bound'
     """
-    asked = completed("minimise", settings, DEFAULTS)
+    asked = completed(minimise, settings, DEFAULTS)
     check_objective("metric", metric, "The call is `minimise(metric, vehicle, road)`.")
     check_call("minimise(metric, vehicle, road)", vehicle, road, asked)
     task = DesignTask([metric], vehicle, road, argument="metric", settings=asked)

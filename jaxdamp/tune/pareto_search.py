@@ -85,7 +85,7 @@ def pareto(
     >>> [round(float(rate), -1) for rate in front.designs[[0, -1], 0]]  # the two optima: 4656.4 and 5536.5
     [4660.0, 5540.0]
     """
-    asked = completed("pareto", settings, DEFAULTS | {"fresh_roads": FRESH_ROADS, "max_steps": MAX_STEPS})
+    asked = completed(pareto, settings, DEFAULTS | {"fresh_roads": FRESH_ROADS, "max_steps": MAX_STEPS})
     _check(objectives, vehicle, road, points, asked | {"points": points, "between": between})
     task = DesignTask(objectives, vehicle, road, argument="objectives", settings=asked)
     names, space, evaluator = task.objective.names, task.space, Evaluator(task, LANES)

@@ -208,7 +208,7 @@ def rescore(
     metrics += [m for m in (objective.metrics if objective else ()) if m not in metrics]
     units = {m.name: m.unit(result.start.units) for m in metrics} | (objective.units(result.start) if objective else {})
     cars = (result.start, result.vehicle)
-    drive = driver(cars, metrics, objective, completed("rescore", run, RUN))
+    drive = driver(cars, metrics, objective, completed(rescore, run, RUN))
     return rescored(drive, roads, units, result.metric)
 
 

@@ -104,7 +104,7 @@ def tolerance_effects(
     if isinstance(metric, Sequence) and not isinstance(metric, str):
         remedy = "Call it once for each metric."
         _checks.refuse("metric", "be a single one", _checks.described(metric), remedy)
-    completed("tolerance_effects", run, RUN)
+    completed(tolerance_effects, run, RUN)
     result = sensitivity(metric, vehicle, road, over=list(scatter), dampers=None, second_order=True, **run)
     ((name, value),) = result.values.items()
     assert result.hessian is not None

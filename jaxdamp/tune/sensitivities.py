@@ -107,7 +107,7 @@ def sensitivity(
     >>> {name: round(float(value), 3) for name, value in result.elasticities("rms_sprung_acceleration").items()}
     {'sprung_mass': -0.648, 'damper.rate': -0.276}
     """
-    asked = completed("sensitivity", settings, DEFAULTS)
+    asked = completed(sensitivity, settings, DEFAULTS)
     wanted = list(metric) if isinstance(metric, Sequence) and not isinstance(metric, str) else [metric]
     given = dict(quantities or {})
     _check(wanted, vehicle, road, given)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import TypedDict
 
 from jaxdamp.metrics import Metric
-from jaxdamp.simulation import AbstractEngine
+from jaxdamp.simulation import RUN, Run
 from jaxdamp.tune.limits import Limits
 from jaxdamp.tune.ranges import Bound
 from jaxdamp.tune.shape import Shape
@@ -53,20 +53,6 @@ class Design(Free, total=False):
     metrics: Sequence[str | Metric]
 
 
-class Run(TypedDict, total=False):
-    """How a vehicle is driven, as in `simulate`: keywords of everything in `tune` that drives.
-
-    Arguments:
-        duration: length of the run [s].
-        dt: spacing of the instants [s]; 1 ms, or that of the engine, if left out.
-        engine: of the simulation, as in `simulate`; one that passes derivatives by parameters.
-    """
-
-    duration: float | None
-    dt: float | None
-    engine: AbstractEngine | None
-
-
 class Search(TypedDict, total=False):
     """How a tuning searches, and how its result is judged.
 
@@ -88,7 +74,6 @@ class Settings(Design, Run, Search, total=False):
     """All keywords that `minimise`, `pareto` and `robust` have in common: those of `Design`, `Run` and `Search`."""
 
 
-RUN: Run = {"duration": None, "dt": None, "engine": None}
 DEFAULTS: Settings = {
     "over": None, "freeze": (), "bounds": None, "tie": None, "limits": None, "shape": (), "metrics": (), **RUN,
     "starts": 1, "seed": 0, "max_steps": 100, "fresh_roads": 32,

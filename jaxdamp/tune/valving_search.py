@@ -134,7 +134,7 @@ def valving(
     (True, True)
     """
     check_module("start", start, (MonoTube, TwinTube), "valving(target, start)")
-    asked = completed("valving", settings, DEFAULTS)
+    asked = completed(valving, settings, DEFAULTS)
     valves = ["piston.*", *["base.*"] * isinstance(start, TwinTube)]
     over = [*valves, "gas.pressure"] if asked["over"] is None else asked["over"]
     _checks.positive("tolerance", tolerance)
