@@ -209,7 +209,8 @@ def design_experiment(
     asked = completed(design_experiment, settings, DEFAULTS)
     tests, duration = asked["tests"], asked["duration"]
     _check(limits, tests, runs, force_noise, criterion, function)
-    how = {"rig": rig, "force_noise": force_noise} | {name: asked[name] for name in ("freeze", "tie", "sampling_rate")}
+    how = {"rig": rig, "force_noise": force_noise, "sampling_rate": asked["sampling_rate"]}
+    how |= {"freeze": asked["freeze"], "tie": asked["tie"]}
     if tests is not None:
         candidates: dict[Any, Excitation] = dict(enumerate(tests))
     else:

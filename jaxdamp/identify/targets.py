@@ -261,20 +261,25 @@ def _free(start: PyTree, asked: Free) -> FreeParameters:
     """The free numbers of a module or a mapping."""
     over, freeze, bounds, tie = asked["over"], asked["freeze"], asked["bounds"], asked["tie"]
     if isinstance(start, Mapping):
-        return _free_numbers(start, asked)
+        if tie:
+            _checks.refuse("tie", "be left out for a mapping of numbers", tie, "Use one name in `numbers` twice.")
+        return _free_numbers(start, over, freeze, bounds or {})
     return free_parameters(without_fitted_ranges(start), over=over, freeze=freeze, bounds=bounds, tie=tie)
 
 
-def _free_numbers(start: Mapping[str, PyTree], asked: Free) -> FreeParameters:
+def _free_numbers(
+    start: Mapping[str, PyTree],
+    over: Sequence[str] | None,
+    freeze: Sequence[str],
+    bounds: Mapping[str, tuple[float, float]],
+) -> FreeParameters:
     """The free numbers of a mapping."""
-    names, over = [*start], asked["over"]
-    if tie := asked["tie"]:
-        _checks.refuse("tie", "be left out for a mapping of numbers", tie, "Use one name in `numbers` twice.")
+    names = [*start]
     if with_point := [name for name in names if "." in name]:
         _checks.refuse("start", "have names without a point", repr(with_point[0]))
-    limits = {name: pair for key, pair in (asked["bounds"] or {}).items() for name in match_paths(names, [key])}
+    limits = {name: pair for key, pair in bounds.items() for name in match_paths(names, [key])}
     chosen = names if over is None else match_paths(names, name_patterns("over", over))
-    held = match_paths(names, name_patterns("freeze", asked["freeze"]))
+    held = match_paths(names, name_patterns("freeze", freeze))
     tree = {name: jnp.asarray(value, float) for name, value in start.items()}
     domains = {name: interval(*map(float, limits[name])) if name in limits else real for name in names}
     free = tuple(Parameter(n, tree[n], "", n, domains[n], False) for n in chosen if n not in held)
