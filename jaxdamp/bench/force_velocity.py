@@ -200,9 +200,9 @@ def read_table(
     signs.check_words(sign, None)
     asked = completed(read_table, files, FILES)
     how = How(Choice({**(columns or {})}, {**(asked["units"] or {})}), sign, side)
-    found, readers = find_files(paths, {*FOLDER_SUFFIXES, *(asked["readers"] or {})}), with_own(asked["readers"])
+    sheets, readers = find_files(paths, {*FOLDER_SUFFIXES, *(asked["readers"] or {})}), with_own(asked["readers"])
     sides, notes, problems = [], [], Problems()
-    for file in found:
+    for file in sheets:
         with problems.collected():
             tables = [with_headers(table) for table in read_tables(file, readers, asked["delimiter"])]
             fitting = [table for table in tables if is_force_velocity(table, how.choice)]
@@ -216,7 +216,7 @@ def read_table(
                 notes += said
     problems.raise_any()
     curves, said = curves_of(sides, how)
-    return ForceVelocityTable(found[0].stem, curves, tuple(dict.fromkeys([*notes, *said])))
+    return ForceVelocityTable(sheets[0].stem, curves, tuple(dict.fromkeys([*notes, *said])))
 
 
 def are_tables(

@@ -1,6 +1,7 @@
 """`design_experiment`: the runs of a test machine that determine a law best."""
 
 import dataclasses
+import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypedDict, Unpack
 
@@ -209,8 +210,10 @@ def design_experiment(
     asked = completed(design_experiment, settings, DEFAULTS)
     tests, duration = asked["tests"], asked["duration"]
     _check(limits, tests, runs, force_noise, criterion, function)
-    how = {"rig": rig, "force_noise": force_noise, "sampling_rate": asked["sampling_rate"]}
-    how |= {"freeze": asked["freeze"], "tie": asked["tie"]}
+    freeze, tie, rate = asked["freeze"], asked["tie"], asked["sampling_rate"]
+    informed = functools.partial(
+        information, law, rig=rig, freeze=freeze, tie=tie, sampling_rate=rate, force_noise=force_noise
+    )
     if tests is not None:
         candidates: dict[Any, Excitation] = dict(enumerate(tests))
     else:
@@ -218,7 +221,7 @@ def design_experiment(
         candidates = dict(grid(limits, asked["waveforms"], duration, asked["strokes"], asked["frequencies"]))
     if not candidates:
         _checks.refuse("limits", "leave tests to choose from", "no candidate", "Allow more, or give `tests`.")
-    pool = _Pool.of(candidates, information(law, list(candidates.values()), **how), limits)
+    pool = _Pool.of(candidates, informed(list(candidates.values())), limits)
     free = pool.free
     goal = Goal.of(free, criterion, function, asked["prior"])
     chosen = goal.exchanged(goal.added([], runs, pool.matrices), pool.matrices)
@@ -228,13 +231,13 @@ def design_experiment(
         more = near([key for key in keys if isinstance(key, Point)], ratio, limits, duration)
         new = {point: test for point, test in more.items() if point not in pool.keys}
         if new:
-            pool = pool.joined(_Pool.of(new, information(law, list(new.values()), **how), limits))
+            pool = pool.joined(_Pool.of(new, informed(list(new.values())), limits))
         chosen = goal.exchanged(chosen, pool.matrices)
     chosen = goal.ordered(chosen, pool.matrices)
     covariance = goal.covariance(pool.matrices[chosen].sum(axis=0))
     design = ExperimentDesign(law, _named([pool.tests[k] for k in chosen]), free, covariance, criterion)
     design = dataclasses.replace(design, function_errors=(goal.function_error(covariance), None))
-    return design if programme is None else _compared(design, goal, pool, chosen, tuple(programme), how)
+    return design if programme is None else _compared(design, goal, pool, chosen, tuple(programme), informed)
 
 
 def _check(
@@ -308,10 +311,10 @@ def _compared(
     pool: _Pool,
     chosen: list[int],
     programme: tuple[Excitation, ...],
-    how: Mapping[str, Any],
+    informed: Callable[[Sequence[Excitation]], Information],
 ) -> ExperimentDesign:
     """The design beside a programme of tests."""
-    of_programme = information(design.law, programme, **how).matrices.sum(axis=0)
+    of_programme = informed(programme).matrices.sum(axis=0)
     aim = float(goal.value(of_programme))
     longest = goal.added(chosen, max(len(programme) - len(chosen), 0), pool.matrices)
     reached = goal.value(np.cumsum(pool.matrices[longest[: len(programme)]], axis=0)) <= aim

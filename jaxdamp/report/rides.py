@@ -46,10 +46,11 @@ def ride_report(
     True
     """
     rides = {"ride": responses} if isinstance(responses, Response) else dict(responses)
-    report = Report.by(ride_report, "Ride", page)
+    title = page.get("title", "Ride")
+    report = Report.by(ride_report, title, page)
     sentences = ride_verdict(rides)
     report.verdict(*sentences)
-    report.sheet(lambda: plots.ride_sheet(rides, name=report.title), sentences[-1], "ride_sheet")
+    report.sheet(lambda: plots.ride_sheet(rides, name=title), sentences[-1], "ride_sheet")
     report.heading("The ride")
     report.text(axles_sentence(rides))
     report.points(notes_of(rides) if remarks is None else remarks)
