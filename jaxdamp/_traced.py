@@ -130,7 +130,7 @@ def of_known_numbers(function: Function) -> Function:
 
             outside = f"Call `{function.__name__}` outside `jax.jit`, `jax.grad` and `jax.vmap`"
             remedy = f"{outside}: docs/from_jax.md says what can be traced in its place."
-            for name, value in signature.bind(*args, **kwargs).arguments.items():
+            for name, value in {**dict(zip(signature.parameters, args, strict=False)), **kwargs}.items():
                 _checks.untraced(name, value, remedy)
         with at_compile_time():
             return function(*args, **kwargs)

@@ -7,12 +7,13 @@ import re
 from collections.abc import Iterator
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import Any
+from typing import Any, Unpack, get_origin
 
 import pytest
 
 import jaxdamp
 from jaxdamp._guesses import shared_names
+from jaxdamp.cli import signatures
 from jaxdamp.dampers import AbstractDamper
 
 
@@ -92,4 +93,21 @@ def test_every_argument_is_mentioned_with_its_unit(package: str) -> None:
             unit = UNITS.get(argument, "") if said != "in a sentence" else ""
             if unit and f"[{unit}" not in said and "as in" not in said and "in the unit" not in said:
                 missing.append(f"{name}({argument} [{unit}])")
+    assert not missing, f"not documented: {', '.join(missing)}"
+
+
+@pytest.mark.parametrize("package", [package for package in PACKAGES if package != "cli"])
+def test_typed_keywords_are_described_with_unit_and_default(package: str) -> None:
+    """Those of `**settings: Unpack[Settings]`: by the class, or by the function."""
+    missing = []
+    for name, value in public(package):
+        given = inspect.signature(value).parameters.values() if inspect.isfunction(value) else ()
+        if any(get_origin(p.annotation) is Unpack for p in given):
+            keywords = {argument.name: argument for argument in signatures.arguments(f"{package}.{name}")}
+            for keyword in keywords.keys() - {p.name for p in given}:
+                said, unit = keywords[keyword].text, UNITS.get(keyword, "")
+                if not ((not unit or f"[{unit}" in said) if said else f"`{keyword}`" in documentation(value)):
+                    missing.append(f"{name}({keyword})")
+                if keywords[keyword].default is ...:
+                    missing.append(f"default of {name}({keyword})")
     assert not missing, f"not documented: {', '.join(missing)}"

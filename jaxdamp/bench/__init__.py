@@ -49,7 +49,7 @@ from jaxdamp.bench.processing import Steps, low_pass_gain
 from jaxdamp.bench.programmes import Excitation as Excitation, RandomTest, SineTest
 from jaxdamp.bench.raw import RawColumn, RawTable
 from jaxdamp.bench.read import read, read_rides
-from jaxdamp.bench.readers import READERS
+from jaxdamp.bench.readers import READERS, BenchFiles as BenchFiles, Files as Files
 from jaxdamp.bench.ride_record import RideRecord
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sensors import Sensors

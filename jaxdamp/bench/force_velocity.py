@@ -3,18 +3,19 @@
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import final
+from typing import Unpack, final
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._files import FOLDER_SUFFIXES, find_files
+from jaxdamp._settings import completed
 from jaxdamp._tables import Column as TableColumn, Table
 from jaxdamp._types import Figure
 from jaxdamp.bench import sign as signs
 from jaxdamp.bench.columns import Choice
 from jaxdamp.bench.raw import Problems
-from jaxdamp.bench.readers import READERS, Reader, read_tables, with_own
+from jaxdamp.bench.readers import FILES, READERS, Files, read_tables, with_own
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import BenchSet
 from jaxdamp.bench.table_points import SIDES, Curve, How, Points, curves_of, is_force_velocity, sides_of, with_headers
@@ -153,9 +154,7 @@ def read_table(
     sign: str | None = None,
     side: str | None = None,
     columns: Mapping[str, str | int | None] | None = None,
-    units: Mapping[str, str] | None = None,
-    delimiter: str | None = None,
-    readers: Mapping[str, Reader] | None = None,
+    **files: Unpack[Files],
 ) -> ForceVelocityTable:
     r"""Read a force-velocity table: a manufacturer's sheet, or points at peak velocity.
 
@@ -172,9 +171,7 @@ def read_table(
         side: of a table with one direction only: "rebound" or "compression", of which another file holds the other, or
             "symmetric" if both are the same.
         columns: "velocity" and "force" to header or number (from 0) of the column.
-        units: "velocity" and "force" to their units, where the headers have none.
-        delimiter: the character between columns of text files, if the search fails.
-        readers: suffix to function that reads such files, as in `read`.
+        files: `units`, `delimiter` and `readers`, all optional (see `Files`).
 
     Returns:
         The points of each setting in SI, in natural order of the settings.
@@ -201,12 +198,13 @@ def read_table(
     if side is not None:
         _checks.one_of("side", side, SIDES)
     signs.check_words(sign, None)
-    how = How(Choice({**(columns or {})}, {**(units or {})}), sign, side)
-    files = find_files(paths, {*FOLDER_SUFFIXES, *(readers or {})})
+    asked = completed(read_table, files, FILES)
+    how = How(Choice({**(columns or {})}, {**(asked["units"] or {})}), sign, side)
+    sheets, readers = find_files(paths, {*FOLDER_SUFFIXES, *(asked["readers"] or {})}), with_own(asked["readers"])
     sides, notes, problems = [], [], Problems()
-    for file in files:
+    for file in sheets:
         with problems.collected():
-            tables = [with_headers(table) for table in read_tables(file, with_own(readers), delimiter)]
+            tables = [with_headers(table) for table in read_tables(file, readers, asked["delimiter"])]
             fitting = [table for table in tables if is_force_velocity(table, how.choice)]
             if not fitting:
                 there = ", ".join(name for table in tables for name in table.names)
@@ -218,7 +216,7 @@ def read_table(
                 notes += said
     problems.raise_any()
     curves, said = curves_of(sides, how)
-    return ForceVelocityTable(files[0].stem, curves, tuple(dict.fromkeys([*notes, *said])))
+    return ForceVelocityTable(sheets[0].stem, curves, tuple(dict.fromkeys([*notes, *said])))
 
 
 def are_tables(

@@ -5,11 +5,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, Unpack
 
 from jaxdamp import _checks
 from jaxdamp._checks import Setting
 from jaxdamp._files import FOLDER_SUFFIXES, find_files
+from jaxdamp._settings import completed
 from jaxdamp._tables import Contents
 from jaxdamp.bench import sign as signs
 from jaxdamp.bench.bench_tables import Interpretation, bench_runs
@@ -17,7 +18,7 @@ from jaxdamp.bench.clock import on_one_clock
 from jaxdamp.bench.columns import Choice, is_record
 from jaxdamp.bench.manifest import BENCH_KEYS, RIDE_KEYS, find_manifest, merged, read_manifest
 from jaxdamp.bench.raw import Problems, RawTable
-from jaxdamp.bench.readers import Reader, read_tables, with_own
+from jaxdamp.bench.readers import BENCH_FILES, FILES, BenchFiles, Files, Reader, read_tables, with_own
 from jaxdamp.bench.ride_record import RideInterpretation, RideRecord, ride_record
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import BenchSet
@@ -35,18 +36,12 @@ def read(
     *,
     sign: str | None = None,
     force_sign: str | None = None,
-    columns: Mapping[str, str | int | None] | None = None,
-    units: Mapping[str, str] | None = None,
-    gains: Mapping[str, str] | None = None,
-    sampling_rate: float | int | None = None,
-    delimiter: str | None = None,
     command: Command | None = None,
     settings: str | Mapping[str, Settings] | None = None,
     manifest: str | os.PathLike[str] | bool = True,
-    readers: Mapping[str, Reader] | None = None,
-    stroke_from_velocity: bool | None = None,
     skip_bad: bool = False,
     drop_bad_rows: bool = False,
+    **files: Unpack[BenchFiles],
 ) -> BenchSet:
     r"""Read bench records from text files, workbooks, MATLAB, TDMS, MDF4 and Parquet files.
 
@@ -62,12 +57,6 @@ def read(
         force_sign: "same" if the files' force is positive when it resists motion in the positive direction,
             "opposite" if it is negative then. Without it: the same if `sign` is given, otherwise what makes the work
             per cycle positive, because a damper takes in energy.
-        columns: quantity to header or number (from 0) of its column, for "time", "stroke", "velocity", "force",
-            "temperature" and "command"; None leaves the file's column unused.
-        units: quantity to unit, where the header has none or a wrong one.
-        gains: quantity to gain of its sensor, for columns in volts: `{"force": "500 N/V", "stroke": "10 mm/V - 2 mm"}`.
-        sampling_rate: samples per second [Hz], for files without a time column.
-        delimiter: the character between columns of text files, if the search fails.
         command: what was set on the damper and held, such as a coil current: one number for all files, a number for
             each record by name or pattern, such as `{"*_0.5A": 0.5, "*_1.0A": 1.0}`, or the name of a setting.
             Without it, a column of a coil current or voltage is the command; `BenchRun.command_channel` if it varies.
@@ -75,12 +64,11 @@ def read(
             pattern with names in braces, `"*_{current}A"`, that takes the settings from the names of the records.
         manifest: a TOML file with these arguments; True takes `jaxdamp.toml` of the folder that is read, and a note
             says so; False takes none. What is given in the call wins.
-        readers: suffix to function that reads such files, beside or instead of `READERS` (docs/own_reader.md).
-        stroke_from_velocity: integrate the velocity of files without a stroke, as for laws that need no place of the
-            stroke; `BenchRun.stroke_is_integrated` says so.
         skip_bad: leave out files that cannot be read, instead of reading none; `BenchSet.left_out` says which and why.
         drop_bad_rows: leave out rows with a missing value or text, at most ten one after the other and 5 % of all;
             straight lines stand in their place, and a note counts them.
+        files: keywords on what is in the files, all optional: `columns`, `gains`, `sampling_rate` and
+            `stroke_from_velocity` (see `BenchFiles`), `units`, `delimiter` and `readers` (see `Files`).
 
     Returns:
         The records, named after their files, in the order of the paths, folders and patterns in natural order. A
@@ -105,19 +93,9 @@ def read(
     force and stroke of the file agree in sign (work per cycle +31.41 J)
     """
     asked: list[str | os.PathLike[str]] = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
-    given: Contents = {
-        "sign": sign,
-        "force_sign": force_sign,
-        "columns": columns,
-        "units": units,
-        "gains": gains,
-        "sampling_rate": sampling_rate,
-        "delimiter": delimiter,
-        "command": command,
-        "settings": settings,
-        "stroke_from_velocity": stroke_from_velocity,
-    }
-    all_readers, note = with_own(readers), ()
+    given: Contents = {"sign": sign, "force_sign": force_sign, "command": command, "settings": settings}
+    given |= completed(read, files, BENCH_FILES)
+    readers, note = given.pop("readers"), ()
     file = find_manifest(manifest, asked)
     if file is not None:
         stated = read_manifest(file, BENCH_KEYS)
@@ -129,12 +107,12 @@ def read(
     tables = ({**(given[name] or {})} for name in ("columns", "units", "gains"))
     choice = Choice(*tables, stroke_from_velocity=bool(given["stroke_from_velocity"]))
     how = Interpretation(choice, given["sign"], given["force_sign"], given["sampling_rate"], drop_bad_rows)
-    files = find_files(asked, {*FOLDER_SUFFIXES, *(readers or {})})
+    found = find_files(asked, {*FOLDER_SUFFIXES, *(readers or {})})
     runs, errors = _read_files(
-        files, all_readers, given["delimiter"], lambda tables, name: _bench_runs(tables, name, how)
+        found, with_own(readers), given["delimiter"], lambda tables, name: _bench_runs(tables, name, how)
     )
     if errors and not (skip_bad and runs):
-        ways, count = Setting("skip_bad", True), len(files) - len(errors)
+        ways, count = Setting("skip_bad", True), len(found) - len(errors)
         others = "The other file" if count == 1 else f"The other {count} files"
         _raise(errors, f"{others} can be read: {ways} leaves out what cannot." if runs else "", ways)
     runs = [(base, replace(run, notes=(*run.notes, *note))) for base, run in runs]
@@ -146,12 +124,10 @@ def read_rides(
     *,
     columns: Mapping[str, str | int] | None = None,
     road: Sequence[str | int] | str | int | None = None,
-    units: Mapping[str, str] | None = None,
     reversed_channels: Sequence[str] | None = None,
     sampling_rate: float | int | None = None,
-    delimiter: str | None = None,
     manifest: str | os.PathLike[str] | None = None,
-    readers: Mapping[str, Reader] | None = None,
+    **files: Unpack[Files],
 ) -> tuple[RideRecord, ...]:
     r"""Read records of a vehicle on a road or a rig, from text files and all formats of `read`.
 
@@ -164,12 +140,10 @@ def read_rides(
             in its header.
         road: headers or numbers of the columns with the height under each wheel, or the force on it, in the order of
             `vehicle.wheel_names`; left out, the column "road", or "road 1", "road 2" and so on.
-        units: channel, "time" or "road" to its unit, where the header has none or a wrong one.
         reversed_channels: channels (or "road") that the file counts positive downwards or in compression.
         sampling_rate: samples per second [Hz], for files without the column "time".
-        delimiter: the character between columns of text files, if the search fails.
         manifest: TOML file with these arguments; those of the call take precedence.
-        readers: suffix to function that reads such files, as in `read`.
+        files: `units`, `delimiter` and `readers`, all optional (see `Files`).
 
     Returns:
         The records, named after their files.
@@ -189,23 +163,18 @@ def read_rides(
     ('m/s^2', 0.980665)
     """
     asked: list[str | os.PathLike[str]] = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
-    given: Contents = {
-        "columns": columns,
-        "road": road,
-        "units": units,
-        "reversed_channels": reversed_channels,
-        "sampling_rate": sampling_rate,
-        "delimiter": delimiter,
-    }
+    given: Contents = {"columns": columns, "road": road, "reversed_channels": reversed_channels}
+    given |= completed(read_rides, files, FILES) | {"sampling_rate": sampling_rate}
+    readers = given.pop("readers")
     file = None if manifest is None else find_manifest(manifest, asked)
     stated = {} if file is None else read_manifest(file, RIDE_KEYS)
     given = {key: stated.get(key) if value is None else value for key, value in given.items()}
     if given["sampling_rate"] is not None:
         _checks.positive("sampling_rate", given["sampling_rate"])
-    delimiter, files = given.pop("delimiter"), find_files(asked, {*FOLDER_SUFFIXES, *(readers or {})})
+    delimiter, found = given.pop("delimiter"), find_files(asked, {*FOLDER_SUFFIXES, *(readers or {})})
     how = RideInterpretation(**given)
     records, errors = _read_files(
-        files,
+        found,
         with_own(readers),
         delimiter,
         lambda tables, name: [ride_record(table, base, how) for table, base in _named(tables, name)],

@@ -6,7 +6,7 @@ import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType, ModuleType
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypedDict
 
 import numpy as np
 
@@ -223,6 +223,44 @@ READERS: Mapping[str, Reader] = MappingProxyType(
     | {".xlsx": read_xlsx, ".xlsm": read_xlsx, ".mat": read_mat, ".tdms": read_tdms}
     | {".mf4": read_mdf, ".mdf": read_mdf, ".parquet": read_parquet}
 )
+
+
+class Files(TypedDict, total=False):
+    """What is said of all files with measured numbers.
+
+    Arguments:
+        units: quantity or channel, also "time" and "road", to unit, where the header has none or a wrong one.
+        delimiter: the character between columns of text files, if the search fails.
+        readers: suffix to function that reads such files, beside or instead of `READERS` (docs/own_reader.md).
+    """
+
+    units: Mapping[str, str] | None
+    delimiter: str | None
+    readers: Mapping[str, Reader] | None
+
+
+class BenchFiles(Files, total=False):
+    """What is said of files of a test bench: keywords of `Files`, and these.
+
+    Arguments:
+        columns: quantity to header or number (from 0) of its column, for "time", "stroke", "velocity", "force",
+            "temperature" and "command"; None leaves the file's column unused.
+        gains: quantity to gain of its sensor, for columns in volts: `{"force": "500 N/V", "stroke": "10 mm/V - 2 mm"}`.
+        sampling_rate: samples per second [Hz], for files without a time column.
+        stroke_from_velocity: integrate the velocity of files without a stroke, as for laws that need no place of the
+            stroke; `BenchRun.stroke_is_integrated` says so.
+    """
+
+    columns: Mapping[str, str | int | None] | None
+    gains: Mapping[str, str] | None
+    sampling_rate: float | int | None
+    stroke_from_velocity: bool | None
+
+
+FILES: Files = {"units": None, "delimiter": None, "readers": None}
+BENCH_FILES: BenchFiles = {
+    **FILES, "columns": None, "gains": None, "sampling_rate": None, "stroke_from_velocity": None
+}  # fmt: skip
 
 
 def with_own(readers: Mapping[str, Reader] | None) -> dict[str, Reader]:

@@ -55,7 +55,8 @@ def arguments(target: str) -> tuple[Argument, ...]:
     if isinstance(node, ast.ClassDef):
         initial = [part for part in node.body if isinstance(part, ast.FunctionDef) and part.name == "__init__"]
         if not initial:
-            return tuple({one.name: one for one in _fields(module, node)}.values())
+            fields, stated = {one.name: one for one in _fields(module, node)}, _defaults(module, node.name)
+            return tuple(one._replace(default=stated.get(name, one.default)) for name, one in fields.items())
         return tuple(_parameters(module, initial[0], texts))[1:]
     assert isinstance(node, ast.FunctionDef)
     return tuple(_parameters(module, node, texts))
@@ -143,6 +144,23 @@ def _fields(module: str, node: ast.ClassDef) -> Iterator[Argument]:
         if isinstance(part, ast.AnnAssign) and isinstance(part.target, ast.Name):
             made = _argument(module, part.target.id, part.annotation, part.value, texts.get(part.target.id, ""))
             yield made._replace(default=...) if partial and made.default is REQUIRED else made
+
+
+def _defaults(module: str, kind: str) -> dict[str, object]:
+    """The defaults of a class of typed keywords: the table of its module that is annotated with it."""
+    tables = [node for node in _statements(module) if isinstance(node, ast.AnnAssign)]
+    return next((_items(module, table) for table in tables if ast.unparse(table.annotation) == kind), {})
+
+
+def _items(module: str, table: ast.stmt) -> dict[str, object]:
+    """What a table of defaults holds, those of the tables that it takes up too."""
+    if not isinstance(table, ast.AnnAssign) or not isinstance(table.value, ast.Dict):
+        return {}
+    found: dict[str, object] = {}
+    for key, value in zip(table.value.keys, table.value.values, strict=True):
+        inner = {} if key else _items(*_find(module, ast.unparse(value)))
+        found |= {ast.literal_eval(key): _value(module, value)} if key else inner
+    return found
 
 
 def _argument(

@@ -46,6 +46,15 @@ from jaxdamp.identify.record_sensitivity import RecordSensitivity as RecordSensi
 from jaxdamp.identify.result import Fit as Fit
 from jaxdamp.identify.rungs import Failure as Failure, Rung as Rung
 from jaxdamp.identify.scheduling import LeftOutSetting as LeftOutSetting, ScheduledFit as ScheduledFit, fit_scheduled
+from jaxdamp.identify.settings import (
+    FitSettings,
+    Free as Free,
+    ManySettings as ManySettings,
+    Records as Records,
+    Search as Search,
+    TargetSettings as TargetSettings,
+    VehicleSettings as VehicleSettings,
+)
 from jaxdamp.identify.targets import TargetFit as TargetFit, fit_targets
 from jaxdamp.identify.training import Training as Training, train
 from jaxdamp.identify.vehicle_comparing import (
@@ -62,6 +71,7 @@ from jaxdamp.identify.vehicle_result import ChannelScore as ChannelScore, Vehicl
 __all__ = [
     "Cusum",
     "Ewma",
+    "FitSettings",
     "LearntStart",
     "MachineLimits",
     "Problem",

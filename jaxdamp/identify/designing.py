@@ -1,14 +1,16 @@
 """`design_experiment`: the runs of a test machine that determine a law best."""
 
 import dataclasses
+import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 from jaxtyping import Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, drawn_by
+from jaxdamp._settings import completed
 from jaxdamp._tables import Column, Table
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import Excitation
@@ -21,6 +23,39 @@ from jaxdamp.rig import Rig
 CRITERIA = ("D", "A", "c")
 FINER = (1.25, 1.08)  # ratios of stroke and frequency of the tests around the chosen ones
 WEAK = 0.5  # standard error, relative to the value, above which a parameter is not identifiable
+
+
+class DesignSettings(TypedDict, total=False):
+    """Which tests a design of experiments chooses from, and what is known of the parameters before.
+
+    Arguments:
+        tests: the candidates, instead of a grid of tests within the limits.
+        waveforms: of the grid: "sine", "triangle", "random", "multisine".
+        strokes: number of strokes of the grid.
+        frequencies: number of frequencies of the grid.
+        duration: length of each run of the grid [s], at least three cycles.
+        sampling_rate: of the records [Hz].
+        freeze: parameters that are known, as in `Free`.
+        tie: parameters that take the values of others, as in `Free`.
+        prior: standard deviations of parameters that are known before, as Gaussians around their values; by path, last
+            part of a path or pattern.
+    """
+
+    tests: Iterable[Excitation] | None
+    waveforms: Sequence[str]
+    strokes: int
+    frequencies: int
+    duration: float
+    sampling_rate: float
+    freeze: Sequence[str]
+    tie: Mapping[str, str] | None
+    prior: Mapping[str, float] | None
+
+
+DEFAULTS: DesignSettings = {
+    "tests": None, "waveforms": WAVEFORMS, "strokes": 5, "frequencies": 7, "duration": 3.0, "sampling_rate": 1000.0,
+    "freeze": (), "tie": None, "prior": None,
+}  # fmt: skip
 
 
 @dataclasses.dataclass(frozen=True)
@@ -131,19 +166,11 @@ def design_experiment(
     *,
     runs: int = 6,
     force_noise: float,
-    tests: Iterable[Excitation] | None = None,
-    duration: float = 3.0,
-    waveforms: Sequence[str] = WAVEFORMS,
-    strokes: int = 5,
-    frequencies: int = 7,
-    sampling_rate: float = 1000.0,
+    rig: Rig | None = None,
     criterion: str = "D",
     function: Callable[[PyTree], PyTree] | None = None,
-    prior: Mapping[str, float] | None = None,
     programme: Iterable[Excitation] | None = None,
-    rig: Rig | None = None,
-    freeze: Sequence[str] = (),
-    tie: Mapping[str, str] | None = None,
+    **settings: Unpack[DesignSettings],
 ) -> ExperimentDesign:
     """Choose the runs that determine the parameters of a law best, before any of them is run.
 
@@ -160,21 +187,13 @@ def design_experiment(
             heat are left out.
         runs: number of runs.
         force_noise: standard deviation of a sample of the measured force [N], as white noise.
-        tests: the candidates, instead of a grid of tests within the limits.
-        duration: length of each run of the grid [s], at least three cycles.
-        waveforms: of the grid: "sine", "triangle", "random", "multisine".
-        strokes: number of strokes of the grid.
-        frequencies: number of frequencies of the grid.
-        sampling_rate: of the records [Hz].
+        rig: the test machine, as in `fit`: its free numbers are determined too.
         criterion: "D", the volume of the confidence ellipsoid; "A", the sum of the squared relative standard errors;
             "c", the standard error of `function`.
         function: of the law, a number computed by JAX, such as a ride metric with it; for the criterion "c".
-        prior: standard deviations of parameters that are known before, as Gaussians around their values; by path, last
-            part of a path or pattern.
         programme: tests to compare with, such as `bench.programmes.paper_000_table_1()`.
-        rig: the test machine, as in `fit`: its free numbers are determined too.
-        freeze: parameters that are known, as in `fit`.
-        tie: as in `fit`.
+        settings: keywords, all optional: `tests`, `waveforms`, `strokes`, `frequencies`, `duration` and `sampling_rate`
+            say which tests are candidates, `freeze`, `tie` and `prior` what is known (see `DesignSettings`).
 
     Raises:
         ValueError: neither limits nor tests; no candidate within the limits; a criterion without its function, or a
@@ -188,18 +207,23 @@ def design_experiment(
     >>> max(design.standard_errors.values()) < 10.0
     True
     """
+    asked = completed(design_experiment, settings, DEFAULTS)
+    tests, duration = asked["tests"], asked["duration"]
     _check(limits, tests, runs, force_noise, criterion, function)
-    how = {"rig": rig, "freeze": freeze, "tie": tie, "sampling_rate": sampling_rate, "force_noise": force_noise}
+    freeze, tie, rate = asked["freeze"], asked["tie"], asked["sampling_rate"]
+    informed = functools.partial(
+        information, law, rig=rig, freeze=freeze, tie=tie, sampling_rate=rate, force_noise=force_noise
+    )
     if tests is not None:
         candidates: dict[Any, Excitation] = dict(enumerate(tests))
     else:
         assert limits is not None
-        candidates = dict(grid(limits, waveforms, duration, strokes, frequencies))
+        candidates = dict(grid(limits, asked["waveforms"], duration, asked["strokes"], asked["frequencies"]))
     if not candidates:
         _checks.refuse("limits", "leave tests to choose from", "no candidate", "Allow more, or give `tests`.")
-    pool = _Pool.of(candidates, information(law, list(candidates.values()), **how), limits)
+    pool = _Pool.of(candidates, informed(list(candidates.values())), limits)
     free = pool.free
-    goal = Goal.of(free, criterion, function, prior)
+    goal = Goal.of(free, criterion, function, asked["prior"])
     chosen = goal.exchanged(goal.added([], runs, pool.matrices), pool.matrices)
     for ratio in FINER if tests is None else ():
         assert limits is not None
@@ -207,13 +231,13 @@ def design_experiment(
         more = near([key for key in keys if isinstance(key, Point)], ratio, limits, duration)
         new = {point: test for point, test in more.items() if point not in pool.keys}
         if new:
-            pool = pool.joined(_Pool.of(new, information(law, list(new.values()), **how), limits))
+            pool = pool.joined(_Pool.of(new, informed(list(new.values())), limits))
         chosen = goal.exchanged(chosen, pool.matrices)
     chosen = goal.ordered(chosen, pool.matrices)
     covariance = goal.covariance(pool.matrices[chosen].sum(axis=0))
     design = ExperimentDesign(law, _named([pool.tests[k] for k in chosen]), free, covariance, criterion)
     design = dataclasses.replace(design, function_errors=(goal.function_error(covariance), None))
-    return design if programme is None else _compared(design, goal, pool, chosen, tuple(programme), how)
+    return design if programme is None else _compared(design, goal, pool, chosen, tuple(programme), informed)
 
 
 def _check(
@@ -287,10 +311,10 @@ def _compared(
     pool: _Pool,
     chosen: list[int],
     programme: tuple[Excitation, ...],
-    how: Mapping[str, Any],
+    informed: Callable[[Sequence[Excitation]], Information],
 ) -> ExperimentDesign:
     """The design beside a programme of tests."""
-    of_programme = information(design.law, programme, **how).matrices.sum(axis=0)
+    of_programme = informed(programme).matrices.sum(axis=0)
     aim = float(goal.value(of_programme))
     longest = goal.added(chosen, max(len(programme) - len(chosen), 0), pool.matrices)
     reached = goal.value(np.cumsum(pool.matrices[longest[: len(programme)]], axis=0)) <= aim

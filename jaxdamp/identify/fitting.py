@@ -2,19 +2,21 @@
 
 import dataclasses
 import functools
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, ParamSpec, Protocol, cast, overload, runtime_checkable
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec, Protocol, Unpack, cast, overload, runtime_checkable
 
 import equinox as eqx
 import jax
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
+from jaxdamp._settings import completed, part
 from jaxdamp._status import Status
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._triangles import triangle
-from jaxdamp.bench import BenchRun, RideRecord, as_runs, usable
+from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.identify.contradicting import contradicting, refuse_contradicting
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, solve_by
 from jaxdamp.identify.judging import MOST_WARNINGS, input_noise_bias, judge, on_bias
@@ -28,83 +30,86 @@ from jaxdamp.identify.preparing import prepare, records_in_words
 from jaxdamp.identify.printed import evaluator
 from jaxdamp.identify.problem import Problem, linearised
 from jaxdamp.identify.search import SearchEnd, Solver
+from jaxdamp.identify.settings import FIT, PROBLEM, FitSettings, ScheduledSettings, TargetSettings
 from jaxdamp.identify.several import Solution, search_from
 from jaxdamp.identify.starting import Start
-from jaxdamp.identify.targets import TargetFit, fit_targets
+from jaxdamp.identify.targets import Goal, Numbers, TargetFit, fit_targets
 from jaxdamp.identify.vehicle_fitting import fit_vehicle
 from jaxdamp.identify.vehicle_result import VehicleFit
 from jaxdamp.parameters import matched_in_words, parameters
 from jaxdamp.vehicles import AbstractVehicle
 
 
-P = ParamSpec("P")
+if TYPE_CHECKING:
+    from jaxdamp.identify.scheduling import ScheduledFit  # which is made of fits of a law
+
+
+P = ParamSpec("P")  # arguments of `fit`
+V = ParamSpec("V")  # of `fit_vehicle`
+M = ParamSpec("M")  # of `fit_many`
 UNSEEN = 1e-12  # of the largest derivative, up to which one is a rounding error
 # Errors due to a law that does not suit the records, as opposed to a wrong call (`TypeError` and so on).
 NUMERICAL = (ValueError, ArithmeticError, eqx.EquinoxRuntimeError, jax.errors.JaxRuntimeError)
 
 
 @runtime_checkable
-class FitCall(Protocol[P]):
-    """`fit` by what is fitted: a law, a vehicle, one law to many dampers, a model to numbers."""
+class FitCall(Protocol[P, V, M]):
+    """`fit` by what is fitted: a law, a vehicle, one law to many dampers or settings, a model to numbers."""
 
     @overload
-    def __call__(self, law: AbstractVehicle, runs: RideRecord | Iterable[RideRecord], **options: Any) -> VehicleFit: ...
+    def __call__(self, *args: V.args, **settings: V.kwargs) -> VehicleFit: ...
     @overload
     def __call__(
-        self, law: Any, runs: Mapping[str, float | tuple[float, float]], *, numbers: Any, **options: Any
+        self, law: PyTree, runs: Mapping[str, Goal], *, numbers: Numbers, **settings: Unpack[TargetSettings]
     ) -> TargetFit: ...
     @overload
-    def __call__(self, law: Start, runs: Mapping[str, BenchRun | Iterable[BenchRun]], **options: Any) -> ManyFits: ...
+    def __call__(
+        self,
+        law: Start,
+        runs: Iterable[BenchRun],
+        *,
+        scheduled: Literal[True],
+        rig: Machine = ...,
+        **settings: Unpack[ScheduledSettings],
+    ) -> "ScheduledFit": ...
     @overload
-    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> FitResult: ...
+    def __call__(self, *args: P.args, **settings: P.kwargs) -> FitResult: ...
+    @overload
+    def __call__(self, *args: M.args, **settings: M.kwargs) -> ManyFits: ...
 
 
-def of_any_records(fit: Callable[P, FitResult]) -> FitCall[P]:
-    """The same function, which hands other records than those of one damper to the fit that explains them."""
+def of_any_records(
+    vehicle: Callable[V, VehicleFit], many: Callable[M, ManyFits]
+) -> Callable[[Callable[P, FitResult]], FitCall[P, V, M]]:
+    """A function of the records of one damper that hands other records to the fit that explains them."""
 
-    @functools.wraps(fit)
-    def by_kind(*args: Any, **options: Any) -> Any:
-        given: dict[str, Any] = dict(zip(("law", "runs"), args, strict=False)) | options
-        model = given.pop("law") if "law" in given else given.pop("vehicle", None)
-        records = given.pop("runs") if "runs" in given else given.pop("records", None)
-        if "numbers" in given:
-            return fit_targets(given.pop("numbers"), model, cast(Any, records), **given)
-        if isinstance(model, AbstractVehicle):
-            return fit_vehicle(model, cast(Any, records), **given)
-        if isinstance(records, Mapping):
-            return fit_many(cast(Any, model), records, **given)
-        if given.pop("scheduled", False):
-            from jaxdamp.identify.scheduling import fit_scheduled  # which is made of fits of a law
+    def dispatched(fit: Callable[P, FitResult]) -> FitCall[P, V, M]:
+        @functools.wraps(fit)
+        def by_kind(*args: Any, **settings: Any) -> Any:
+            given: dict[str, Any] = dict(zip(("law", "runs"), args, strict=False)) | settings
+            model = given.pop("law") if "law" in given else given.pop("vehicle", None)
+            records = given.pop("runs") if "runs" in given else given.pop("records", None)
+            if "numbers" in given:
+                return fit_targets(given.pop("numbers"), model, cast(Any, records), **given)
+            if isinstance(model, AbstractVehicle):
+                return cast(Any, vehicle)(model, records, **given)
+            if isinstance(records, Mapping):
+                return cast(Any, many)(model, records, **given)
+            if given.pop("scheduled", False):
+                from jaxdamp.identify.scheduling import fit_scheduled  # which is made of fits of a law
 
-            return fit_scheduled(cast(Any, model), cast(Any, records), **given)
-        return fit(*args, **options)
+                return fit_scheduled(cast(Any, model), cast(Any, records), **given)
+            return fit(*args, **settings)
 
-    return cast(FitCall[P], by_kind)
+        return cast(FitCall[P, V, M], by_kind)
+
+    return dispatched
 
 
-@of_any_records
+@of_any_records(fit_vehicle, fit_many)
 @of_known_numbers
 def fit(
-    law: Start,
-    runs: BenchRun | Iterable[BenchRun],
-    *,
-    rig: Machine = None,
-    over: Sequence[str] | None = None,
-    freeze: Sequence[str] = (),
-    bounds: Mapping[str, tuple[float, float]] | None = None,
-    tie: Mapping[str, str] | None = None,
-    per_record: Sequence[str] = (),
-    weighting: str | Sequence[float] = "samples",
-    loss: str = "squares",
-    priors: Mapping[str, tuple[float, float]] | None = None,
-    force_noise: float | None = None,
-    input_noise: tuple[float, float] | None = None,
-    initial_state: str = "warm_up",
-    samples_per_cycle: int | None = 400,
-    starts: int | None = None,
-    max_steps: int = 200,
-    bad_records: str = "refuse",
-    solver: Solver | None = None,
+    law: Start, runs: BenchRun | Iterable[BenchRun], *, rig: Machine = None, **settings: Unpack[FitSettings]
 ) -> FitResult:
     """Fit a damper law to bench records by least squares on the force, or another model to what was measured of it.
 
@@ -142,43 +147,11 @@ def fit(
             is the whole static force: a constant force of the law is held at zero, or zero at rest in a table, unless
             the call gives it a value; it is left out beside a law with a static force of its own meaning, such as a gas
             charge. All paths of parameters then begin with `law.` or `rig.`; their last parts stay the same.
-        over: parameters of the law to fit, by path, last part of a path, or pattern; all if left out.
-        freeze: parameters to hold at their start, named in the same way.
-        bounds: extra limits `{name: (lower, upper)}` in the parameter's unit.
-        tie: parameters that take the values of others, such as `{"terms.1.**": "terms.0.**"}`: one free value for each
-            group (see `jaxdamp.parameters.free_parameters`).
-        per_record: parameters with one value for each record, such as a friction that depends on the temperature; names
-            as in `freeze`. All other parameters are common to the records. A record that was not fitted is predicted
-            with their means, and begins as warm (`initial_rise`) as its first three cycles show, which are not scored.
-        weighting: `"samples"`, equal weight of every sample; `"runs"`, equal weight of every record relative to its RMS
-            force; or one standard deviation [N] for each record, of which only the ratios matter. `inf` leaves a record
-            out of the fit; it is still scored.
-        loss: `"squares"`; or `"huber"`, `"soft_l1"` or `"student_t"`, which spikes and dropouts hardly move: samples
-            far from the law get less weight. Their share stands in `criterion`.
-        priors: what is known of parameters beforehand, `{name: (mean, standard deviation)}` in the parameter's unit.
-        force_noise: standard deviation [N] of the measured force if it is known, as independent noise. Otherwise it is
-            estimated from the residual, including its correlation.
-        input_noise: standard deviations of stroke [m] and velocity [m/s] as they stand in the records. Least squares of
-            the force takes both as exact; the bias that this causes is estimated and stands beside each parameter.
-        initial_state: of a law with states at the first sample of a record: `"warm_up"`, as above; `"rest"`, the law's
-            own, for records that begin with the first motion; or `"periodic"`, for records cut out of a motion that had
-            lasted long: in those whose stroke repeats from cycle to cycle the law has settled, however slow it is, and
-            all samples are compared. Other records start as with `"warm_up"`. Or `"estimated"`: free numbers of each
-            record, fitted with the law (`initial_states` of the result; paths then begin with `law.`, `rig.` or
-            `records.`). A record that was not fitted is predicted from its mean force in the first second of rest,
-            which is not scored, or after a warm-up cycle. How each starts stands in `criterion`.
-        samples_per_cycle: see above; `None` uses every sample.
-        starts: largest number of starts: `law` first, then those that its laws propose (`other_starts`); all of them if
-            left out. With 1, the search starts from `law` only.
-        max_steps: largest number of steps of each search.
-        bad_records: what is done with records in which the preflight finds an error, such as a clipped or lost force:
-            "refuse" the fit, "leave_out" these records, or "keep" them. Spikes are no error for a robust `loss`.
-            Records of the same motion with different forces, such as those of two settings, are refused too unless
-            "keep" pools them, or each record has numbers of its own.
-        solver: any least-squares solver or minimiser of optimistix, such as `optimistix.Dogleg(rtol=1e-8, atol=1e-8)`,
-            in place of `jaxdamp.solve.BoundedLevenbergMarquardt()`. It searches in coordinates without bounds, in which
-            an edge of a domain is approached only slowly; a violated condition between parameters is an infinite
-            residual. The standard errors and the checks are the same.
+        settings: keywords, all optional: `over`, `freeze`, `bounds`, `tie`, `priors` say what may change and what is
+            known of it (see `Free`); `initial_state`, `samples_per_cycle` how records are taken (see `Records`); `loss`
+            and `max_steps` how is searched (see `Search`); `per_record` and `weighting` (see `ProblemSettings`),
+            `force_noise`, `input_noise`, `starts`, `bad_records`, `solver` are described in `FitSettings`, as are all
+            defaults.
 
     Returns:
         The law with the range of the fitted records (`law.fitted_to`), its parameters with standard errors, scores and
@@ -195,46 +168,37 @@ def fit(
     >>> abs(result["rebound_rate"].value - 2600.0) < 4 * result["rebound_rate"].standard_error
     True
     """
+    asked = completed(fit, settings, FIT)
+    loss, force_noise, starts = asked["loss"], asked["force_noise"], asked["starts"]
     _checks.one_of("loss", loss, LOSSES)
     if force_noise is not None:
         _checks.positive("force_noise", force_noise)
-    runs = usable(as_runs(runs, call="fit(law, runs)"), bad_records, robust=loss != "squares")
-    problem = prepare(
-        law,
-        runs,
-        rig=rig,
-        over=over,
-        freeze=freeze,
-        bounds=bounds,
-        tie=tie,
-        per_record=per_record,
-        weighting=weighting,
-        priors=priors,
-        initial_state=initial_state,
-        samples_per_cycle=samples_per_cycle,
-    )
-    if bad_records != "keep" and not per_record and initial_state != "estimated":
+    runs = usable(as_runs(runs, call="fit(law, runs)"), asked["bad_records"], robust=loss != "squares")
+    problem = prepare(law, runs, rig=rig, **part(asked, PROBLEM))
+    if asked["bad_records"] != "keep" and not asked["per_record"] and asked["initial_state"] != "estimated":
         refuse_contradicting(contradicting(problem.free.tree, problem.fitted_to))
 
     def by_squares(problem: Problem, starts: int | None) -> Solution:
-        return solve(problem, starts=starts, max_steps=max_steps, solver=solver)
+        return solve(problem, starts=starts, max_steps=asked["max_steps"], solver=asked["solver"])
 
     noise = functools.partial(noise_of, force_noise=force_noise)
     problem, solution = solve_by(problem, by_squares, loss=loss, noise=noise, starts=starts)
     on_machine = holds_static_force(rig)
     if on_machine:
         problem, solution = with_static_force_on_machine(problem, solution)
-    known = [p.path for p in parameters(problem.free.tree)]
-    named = matched_in_words(known, over=over or (), freeze=freeze, bounds=bounds or {}, per_record=per_record)
+    named = matched_in_words(
+        [p.path for p in parameters(problem.free.tree)],
+        **{name: asked[name] for name in ("over", "freeze", "bounds", "per_record")},
+    )
     result = dataclasses.replace(judge(problem, solution, force_noise=force_noise), patterns=named)
     if on_machine:
         said = static_force_in_words(result, problem.runs)
         result = dataclasses.replace(result, warnings=(*result.warnings, *said))
-    words = (criterion_in_words(problem, loss, priors or {}), records_in_words(problem))
+    words = (criterion_in_words(problem, loss, asked["priors"] or {}), records_in_words(problem))
     criterion = "; ".join(filter(None, words))
-    if input_noise is None:
+    if asked["input_noise"] is None:
         return dataclasses.replace(result, criterion=criterion)
-    biases = map(float, input_noise_bias(problem, solution.best, input_noise))
+    biases = map(float, input_noise_bias(problem, solution.best, asked["input_noise"]))
     estimates = tuple(e._replace(bias=bias) for e, bias in zip(result.parameters, biases, strict=True))
     biased = on_bias(estimates)
     return dataclasses.replace(

@@ -4,6 +4,7 @@ import dataclasses
 import functools
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Unpack
 
 import jax.numpy as jnp
 import numpy as np
@@ -11,6 +12,7 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
+from jaxdamp._settings import completed
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun
 from jaxdamp.blocks import Cluster
@@ -33,6 +35,7 @@ from jaxdamp.identify.many_records import (
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.model import initial_state_for, own_names, rig_of
 from jaxdamp.identify.preparing import Beginning, weights
+from jaxdamp.identify.settings import MANY, ManySettings
 from jaxdamp.identify.several import other_starts
 from jaxdamp.identify.starting import Start
 from jaxdamp.parameters import FreeParameters, name_patterns
@@ -49,22 +52,12 @@ def fit_many(
     dampers: Mapping[str, BenchRun | Iterable[BenchRun]] | Iterable[BenchRun | Iterable[BenchRun]],
     *,
     rig: Machine = None,
-    freeze: Sequence[str] = (),
-    bounds: Mapping[str, tuple[float, float]] | None = None,
-    tie: Mapping[str, str] | None = None,
     shared: Mapping[str, int] | Sequence[str] = (),
     settings: Sequence[float | int] | None = None,
-    weighting: str = "samples",
-    loss: str = "squares",
-    priors: Mapping[str, tuple[float, float]] | None = None,
-    initial_state: str = "warm_up",
-    samples_per_cycle: int | None = 400,
-    starts: int = 1,
-    max_steps: int = 200,
-    bad_records: str = "refuse",
     file: str | os.PathLike[str] | None = None,
     cluster: Cluster = None,
     progress: Callable[[int, int], None] | None = None,
+    **options: Unpack[ManySettings],
 ) -> ManyFits:
     """Fit one law to many dampers at once: the same least squares as `fit`, for all of them side by side.
 
@@ -80,29 +73,18 @@ def fit_many(
         law: the start of all dampers, as in `fit`; a law class starts from the records of some of them together.
         dampers: the records of each damper, by name or in order.
         rig: the test machine, as in `fit`; its numbers differ from damper to damper unless they are `shared`.
-        freeze: parameters to hold at the start.
-        bounds: extra limits, as in `fit`.
-        tie: parameters that take the values of others, as in `fit`.
         shared: parameters common to all dampers, `["blow_off_rate"]`, or the degree of their polynomials in the
             setting, `{"blow_off_rate": 0, "rebound_rate": 2}`.
         settings: one number for each damper.
-        weighting: of the records of a damper: `"samples"` or `"runs"`, as in `fit`.
-        loss: as in `fit`; each damper has its own weights.
-        priors: as in `fit`, the same for every damper, once for all of a shared parameter; they count against the noise
-            that the standard errors assume.
-        initial_state: of a law with states, as in `fit`; dampers whose states drift in a motion that is said to be
-            periodic have a remark. With "estimated" the dampers are fitted one after the other.
-        samples_per_cycle: slow records are averaged in blocks down to this number.
-        starts: largest number of starts of each damper, side by side: `law`, then those that it proposes. Shared
-            parameters then begin where the fits of single dampers end.
-        max_steps: largest number of steps of each search.
-        bad_records: "refuse", "leave_out" or "keep" records with an error, as in `fit`; a damper keeps one at least.
         file: a Zarr store (`.zarr`, a folder) for the fits, which are computed in blocks of 64 dampers. The records of
             `bench.DamperRecords` are read block by block; a damper that cannot be read or fitted does not stop the
             others, and its remark says why. The same call goes on after an interruption, and fits only dampers that
             are new or whose records changed. A law class starts from the first damper, so that a store can grow.
         cluster: who computes the blocks, as in `jaxdamp.sweep`: a Dask `Client`, an executor, or a part such as "3/16".
         progress: of the blocks, called with the number of rows done and of all rows, 64 in a block.
+        options: keywords of `fit`, all optional: `over`, `freeze`, `bounds`, `tie`, `priors` (see `Free`),
+            `initial_state`, `samples_per_cycle` (see `Records`), `loss`, `max_steps` (see `Search`), `weighting`,
+            `starts`, 1 if left out, and `bad_records` (see `ManySettings`).
 
     Returns:
         The laws with their parameters, standard errors, scores and a status each; dampers that differ from the others
@@ -121,14 +103,12 @@ def fit_many(
     >>> round(float(many.law_at(1.5).rebound_rate), -1)
     2150.0
     """
-    _checks.one_of("weighting", weighting, ["samples", "runs"])
-    _checks.one_of("loss", loss, LOSSES)
-    _checks.one_of("initial_state", initial_state, INITIAL_STATES)
-    _checks.counts(max_steps=max_steps, starts=starts)
+    how: Options = {"rig": rig, **completed(fit_many, options, MANY)}
+    _checks.one_of("weighting", how["weighting"], ["samples", "runs"])
+    _checks.one_of("loss", how["loss"], LOSSES)
+    _checks.one_of("initial_state", how["initial_state"], INITIAL_STATES)
+    _checks.counts(max_steps=how["max_steps"], starts=how["starts"])
     stated = None if settings is None else tuple(map(float, settings))
-    how = {"rig": rig, "freeze": freeze, "bounds": bounds, "tie": tie, "weighting": weighting, "loss": loss}
-    how |= {"priors": priors, "initial_state": initial_state, "samples_per_cycle": samples_per_cycle}
-    how |= {"max_steps": max_steps, "bad_records": bad_records, "starts": starts}
     by_names = by_name(dampers)
     if file is not None or cluster is not None:
         return fit_into_store(law, by_names, stated, file, cluster, progress, shared=bool(shared), options=how)
@@ -160,7 +140,7 @@ def fitted_together(
     free, records = begin.free, tuple(dampers.values())
     degrees = shared if isinstance(shared, Mapping) else dict.fromkeys(name_patterns("shared", shared), 0)
     depends = dependence(free, own_names(begin.model).find_keys("shared", degrees), settings, len(dampers))
-    how = {**options, "bad_records": "keep"}
+    how: Options = {**options, "bad_records": "keep"}
     many = functools.partial(ManyFits, tuple(dampers), records, settings, free=free, options=how)
     initial_state = initial_state_for(begin.model, options["initial_state"])
     if initial_state == "estimated":
@@ -182,7 +162,7 @@ def _side_by_side(
     loss: str,
     starts: int,
     max_steps: int,
-) -> Options:
+) -> dict[str, Any]:
     """What the searches of all dampers end with: fields of the result."""
     everyone = lanes.damper
     lanes, begin = _with_other_starts(lanes, records, starts)
@@ -209,7 +189,7 @@ def _side_by_side(
 
 def _one_by_one(
     records: Sequence[tuple[BenchRun, ...]], law: AbstractDamper, free: FreeParameters, how: Options
-) -> Options:
+) -> dict[str, Any]:
     """Each damper by a fit of its own, where records have numbers of their own: states at their beginning."""
     from jaxdamp.identify.fitting import fit  # which hands many dampers to this file
 

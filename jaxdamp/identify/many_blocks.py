@@ -270,7 +270,7 @@ def _identity(beginning: Beginning, options: Options) -> dict[str, str]:
     for leaf in leaves:
         digest.update(np.asarray(leaf).tobytes() if isinstance(leaf, jax.Array | np.ndarray) else repr(leaf).encode())
     start = f"{type(beginning.law).__name__} ({digest.hexdigest()[:12]})"
-    said = {name: str(value) for name, value in options.items() if name not in ("rig", "freeze")}
+    said = {name: str(value) for name, value in options.items() if name not in ("rig", "over", "freeze")}
     return {"start": start, "parameters": ", ".join(beginning.free.names), **said}
 
 

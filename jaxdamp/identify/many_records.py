@@ -1,22 +1,29 @@
 """The records of many dampers: what a call gives as such, what a fit takes of them, and where all fits start."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._settings import part
 from jaxdamp.bench import BenchRun, DamperRecords, as_runs, usable
 from jaxdamp.identify.contradicting import contradicting, refuse_contradicting
+from jaxdamp.identify.machine import Machine
 from jaxdamp.identify.model import Model
 from jaxdamp.identify.preparing import Beginning, begun
+from jaxdamp.identify.settings import FREE, PROBLEM, ManySettings, ProblemSettings
 from jaxdamp.identify.starting import Start
 from jaxdamp.identify.stated import stated_parameters
 
 
 CALL = 'fit_many(law, {"A": runs_of_a, "B": runs_of_b})'
-Options = Mapping[str, Any]  # of a call
 AllRecords = Mapping[str, tuple[BenchRun, ...]]
+
+
+class Options(ManySettings, total=False):
+    """What a call asks of each fit."""
+
+    rig: Machine
 
 
 def by_name(dampers: object) -> AllRecords:
@@ -73,5 +80,5 @@ def begun_on(law: Start, runs: Sequence[BenchRun], options: Options, shared: Ite
         options: of `fit_many`.
         shared: names of parameters that are shared.
     """
-    how = {name: options[name] for name in ("rig", "freeze", "bounds", "tie", "priors")}
-    return begun(law, runs, [1.0] * len(runs), **how, initial_state="warm_up", mentioned=shared)
+    how: ProblemSettings = {**PROBLEM, **part(options, FREE)}
+    return begun(law, runs, [1.0] * len(runs), options["rig"], how, mentioned=shared)

@@ -1,13 +1,14 @@
 """`prepare`: a law and bench records as a least-squares problem."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, Unpack
 
 import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._settings import completed
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper, Reach
@@ -31,6 +32,7 @@ from jaxdamp.identify.model import (
     with_means,
 )
 from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.settings import PROBLEM, ProblemSettings
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.identify.stated import stated_parameters, stated_values, with_stated
 from jaxdamp.identify.traces import batches_of_each, owners, places
@@ -42,19 +44,7 @@ FIT_OUTSIDE = "Call it outside `jax.jit`, `jax.grad` and `jax.vmap`; the residua
 
 @of_known_numbers
 def prepare(
-    law: Start,
-    runs: BenchRun | Iterable[BenchRun],
-    *,
-    rig: Machine = None,
-    over: Sequence[str] | None = None,
-    freeze: Sequence[str] = (),
-    bounds: Mapping[str, tuple[float, float]] | None = None,
-    tie: Mapping[str, str] | None = None,
-    per_record: Sequence[str] = (),
-    weighting: str | Sequence[float] = "samples",
-    priors: Mapping[str, tuple[float, float]] | None = None,
-    initial_state: str = "warm_up",
-    samples_per_cycle: int | None = 400,
+    law: Start, runs: BenchRun | Iterable[BenchRun], *, rig: Machine = None, **settings: Unpack[ProblemSettings]
 ) -> Problem:
     """The first of the three steps of `fit`, whose arguments these are: `prepare`, `solve`, `judge`.
 
@@ -62,15 +52,8 @@ def prepare(
         law: as in `fit`.
         runs: as in `fit`.
         rig: as in `fit`.
-        over: as in `fit`.
-        freeze: as in `fit`.
-        bounds: as in `fit`.
-        tie: as in `fit`.
-        per_record: as in `fit`.
-        weighting: as in `fit`.
-        priors: as in `fit`.
-        initial_state: as in `fit`.
-        samples_per_cycle: as in `fit`.
+        settings: keywords of `fit`, all optional: those of `Free`, `Records`, and `per_record` and `weighting` (see
+            `ProblemSettings`).
 
     Returns:
         The residuals of the records, and the free parameters with their start.
@@ -85,24 +68,14 @@ def prepare(
     >>> round(float(judge(problem, solve(problem)).law.rate), 3)
     1500.0
     """
-    _checks.one_of("initial_state", initial_state, INITIAL_STATES)
+    asked = completed(prepare, settings, PROBLEM)
+    _checks.one_of("initial_state", asked["initial_state"], INITIAL_STATES)
     _checks.untraced("law", law, FIT_OUTSIDE)
     runs = _records(runs)
+    weighting = asked["weighting"]
     sigma = weights(weighting, runs)
-    begin = begun(
-        law,
-        runs,
-        sigma,
-        rig=rig,
-        over=over,
-        freeze=freeze,
-        bounds=bounds,
-        tie=tie,
-        per_record=per_record,
-        priors=priors,
-        initial_state=initial_state,
-    )
-    return begin.problems([runs], [sigma], samples_per_cycle, each=weighting == "runs")[0]
+    begin = begun(law, runs, sigma, rig, asked)
+    return begin.problems([runs], [sigma], asked["samples_per_cycle"], each=weighting == "runs")[0]
 
 
 class Beginning(NamedTuple):
@@ -146,23 +119,17 @@ def begun(
     law: Start,
     runs: Sequence[BenchRun],
     sigma: Sequence[float],
-    *,
     rig: Machine,
-    over: Sequence[str] | None = None,
-    freeze: Sequence[str],
-    bounds: Mapping[str, tuple[float, float]] | None,
-    tie: Mapping[str, str] | None,
-    per_record: Sequence[str] = (),
-    priors: Mapping[str, tuple[float, float]] | None,
-    initial_state: str,
+    asked: ProblemSettings,
     mentioned: Iterable[str] = (),
 ) -> Beginning:
     """The start that records with these `weights` give, as in `fit`, and what the call mentions besides."""
+    bounds, priors, tie, per_record = asked["bounds"], asked["priors"], asked["tie"], asked["per_record"]
     fitted_to = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
     named = [*mentioned, *name_patterns("per_record", per_record), *(bounds or ()), *(priors or ()), *(tie or {})]
     begin, machine, held = started_on(law, fitted_to, rig, named)
     model, absent = on_rig(begin, machine), [*absent_paths(machine), *held]
-    initial_state = initial_state_for(model, initial_state)
+    initial_state = initial_state_for(model, asked["initial_state"])
     expected: tuple[Priors, ...] = ()
     if initial_state == "estimated":
         model, expected, unfitted = _with_estimated_states(model, runs, sigma)
@@ -171,8 +138,9 @@ def begun(
     stated = stated_values(model, runs)
     model = with_stated(model, stated_parameters(model, fitted_to))
     own = _per_record(model, names.find("per_record", per_record), sigma, absent, stated)
-    frozen = [*names.find("freeze", freeze), *names.find("freeze", frozen_by(law)), *absent]
-    frozen += [*not_chosen(model, over, "rig.", STARTS), *(p.path for p in parameters(model) if p.path in stated)]
+    frozen = [*names.find("freeze", asked["freeze"]), *names.find("freeze", frozen_by(law)), *absent]
+    frozen += not_chosen(model, asked["over"], "rig.", STARTS)
+    frozen += [p.path for p in parameters(model) if p.path in stated]
     limits, tied = names.find_keys("bounds", bounds), names.find_keys("tie", tie)
     free = free_parameters(_spread(model, own, len(runs)), freeze=frozen, bounds=limits, tie=tied)
     _checks.finite("law", free.values)

@@ -4,7 +4,7 @@ import dataclasses
 import functools
 import itertools
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple, Unpack, cast
 
 import jax
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
 from jaxdamp._results import AbstractResult, Derived
+from jaxdamp._settings import completed, part
 from jaxdamp._tables import Column, Contents, Table, plain
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Figure
@@ -26,6 +27,7 @@ from jaxdamp.identify.machine import OFFSET, Machine, held_constant_forces, refu
 from jaxdamp.identify.model import law_of, rig_of
 from jaxdamp.identify.predicting import score
 from jaxdamp.identify.preparing import prepare
+from jaxdamp.identify.settings import FIT, PROBLEM, SCHEDULED, FitSettings, ScheduledSettings
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.identify.stated import stated_parameters
 from jaxdamp.parameters import get, match_paths, name_patterns, parameters, with_values
@@ -33,7 +35,6 @@ from jaxdamp.rig import Rig
 
 
 CALL = "fit_scheduled(law, runs)"
-OF_THE_RESULT = ("loss", "force_noise", "input_noise", "bad_records")  # options of `fit` without a part in starts
 Alone = dict[float, AtSetting]
 
 
@@ -156,16 +157,7 @@ class ScheduledFit(AbstractResult):
 
 @of_known_numbers
 def fit_scheduled(
-    law: Start,
-    runs: Iterable[BenchRun],
-    *,
-    common: Sequence[str] = (),
-    rig: Machine = OFFSET,
-    weighting: str = "samples",
-    freeze: Sequence[str] = (),
-    blend: str | None = None,
-    progress: Callable[[str], None] | None = None,
-    **options: Any,
+    law: Start, runs: Iterable[BenchRun], *, rig: Machine = OFFSET, **settings: Unpack[ScheduledSettings]
 ) -> ScheduledFit:
     """Fit one law to records at several settings: it depends on the command, a `Scheduled`.
 
@@ -185,13 +177,9 @@ def fit_scheduled(
     Arguments:
         law: the start, as in `fit`, of a law without a command.
         runs: records that state their `command`, of two or more commands, and such with a command that varies.
-        common: parameters that do not depend on the setting, by path, last part of a path or pattern.
         rig: the test machine as in `compare`, common to all settings.
-        weighting: `"samples"` or `"runs"`, as in `fit`.
-        freeze: parameters to hold at their start, as in `fit`.
-        blend: `"parameters"` or `"force"`; chosen as above if it is left out, and `choice` says why.
-        progress: called with what is fitted next; a line in the terminal if it is left out.
-        options: passed on to `fit`.
+        settings: keywords, all optional: `common`, `blend` and `progress` (see `ScheduledSettings`), and those of `fit`
+            (see `FitSettings`).
 
     Raises:
         ValueError: records without a command, or of one command only; records of one command that contradict
@@ -205,23 +193,22 @@ def fit_scheduled(
     >>> identify.fit_scheduled(dampers.Linear, runs).between[0].fit_percent > 95.0
     True
     """
-    robust = options.get("loss", "squares") != "squares"
-    bad_records = options.get("bad_records", "refuse")
-    runs = usable(settings_stated(as_runs(runs, call=CALL)), bad_records, robust=robust)
+    asked = completed(fit_scheduled, settings, SCHEDULED)
+    blend, progress, bad_records = asked["blend"], asked["progress"], asked["bad_records"]
+    runs = usable(settings_stated(as_runs(runs, call=CALL)), bad_records, robust=asked["loss"] != "squares")
     if bad_records != "keep":
         refuse_contradicting(contradictions(runs, same_command=True))
-    _checks.one_of("weighting", weighting, ("samples", "runs"))
+    _checks.one_of("weighting", cast(str, asked["weighting"]), ("samples", "runs"))
     if blend is not None:
         _checks.one_of("blend", blend, ("parameters", "force"))
-    frozen = [*name_patterns("freeze", freeze), *frozen_by(law)]
-    if options.get("initial_state") == "estimated":
+    if asked["initial_state"] == "estimated":
         remedy = 'Estimate states in fits of one setting: `fit(law, runs, initial_state="estimated")`.'
         _checks.refuse("initial_state", "be the same at every fit of a chain of settings", "'estimated'", remedy)
+    frozen = [*name_patterns("freeze", asked["freeze"]), *frozen_by(law)]
     held_rig, lag = without_command_lag(rig)
     refuse_lag_of_held(lag > 0.0, runs)
-    chain = Chain(
-        law, runs, common, held_rig, lag, options | {"weighting": weighting, "freeze": frozen, "bad_records": "keep"}
-    )
+    how: FitSettings = {**part(asked, FIT), "freeze": frozen, "bad_records": "keep"}
+    chain = Chain(law, runs, asked["common"], held_rig, lag, how)
     with Progress("Fitting by setting") as line:
         shown = progress or line
         alone = chain.alone(chain.settings, shown)
@@ -250,7 +237,7 @@ class Chain:
     common: Sequence[str]
     rig: Machine  # without the lag of the actuator, which shows only where the command varies
     command_lag: float  # s, its start; 0 where none is fitted
-    options: dict[str, Any]
+    how: FitSettings
     own: Alone = dataclasses.field(default_factory=dict)  # the fit at a setting from the start of the law there
 
     @property
@@ -276,26 +263,24 @@ class Chain:
         for setting in settings:
             if setting not in self.own:
                 shown(f"{setting:g} alone")
-                self.own[setting] = self.fitted_at(setting, self.law)
+                self.own[setting] = self.fitted_at(setting, self.law, self.how["starts"])
         fits = {setting: self.own[setting] for setting in settings}
         pairs = list(itertools.pairwise(settings))
         for begin, to in [*pairs, *((above, below) for below, above in reversed(pairs))]:
             if fits[to].is_only_minimum:
                 continue
             shown(f"{to:g} from the law at {begin:g}")
-            again = self.fitted_at(to, fits[begin].law, starts=1)
+            again = self.fitted_at(to, fits[begin].law, 1)
             fits[to] = min(fits[to], again, key=lambda at: at.rmse)
         return fits
 
-    def fitted_at(self, setting: float, start: Start, **changed: Any) -> AtSetting:
+    def fitted_at(self, setting: float, start: Start, starts: int | None) -> AtSetting:
         """The law at one setting, by least squares: the start of a larger fit, so without errors and warnings."""
-        options = {name: value for name, value in self.options.items() if name not in OF_THE_RESULT} | changed
-        search = {name: options.pop(name) for name in ("starts", "max_steps") if name in options}
-        problem = prepare(start, self.at(setting), rig=self.rig, **options)
+        problem = prepare(start, self.at(setting), rig=self.rig, **part(self.how, PROBLEM))
         if takes_command(problem.law):
             remedy = "Such a law is fitted to all commands by `fit`."
             _checks.refuse("law", "take no command itself", repr(problem.law), remedy)
-        solution = solve(problem, **search)
+        solution = solve(problem, starts=starts, max_steps=self.how["max_steps"], solver=self.how["solver"])
         model = problem.free.started_at(solution.best.values).tree
         errors = score(model, problem.runs)[:2]
         open_numbers = undetermined(problem, solution.best)
@@ -303,7 +288,7 @@ class Chain:
 
     def choice(self, alone: Alone) -> Choice:
         """What lies between the settings, by what the fits at each show."""
-        return choose_blend(alone, self.options.get("initial_state", "warm_up"))
+        return choose_blend(alone, self.how["initial_state"])
 
     def together(self, alone: Alone, blend: str) -> FitResult:
         """The fit of all records of these settings as one law, from the laws of each.
@@ -324,8 +309,8 @@ class Chain:
         at_levels = alike and not (varying and blend == "force")
         scheduled = Scheduled(blended, list(alone), min(alone), "parameters" if at_levels else "force")
         held = held_constant_forces(scheduled, machine)
-        options: dict[str, Any] = self.options | {"starts": 1, "tie": tie, "freeze": [*self.options["freeze"], *held]}
-        result = fit(scheduled, [*self.held(alone), *varying], rig=machine, **options)
+        how: FitSettings = {**self.how, "starts": 1, "tie": tie, "freeze": [*self.how["freeze"], *held]}
+        result = fit(scheduled, [*self.held(alone), *varying], rig=machine, **how)
         return with_blended_forces(result) if at_levels and blend == "force" else result
 
     def _shared_by(self, laws: Sequence[AbstractDamper]) -> list[str]:

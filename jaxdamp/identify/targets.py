@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple, TypeAlias, final
+from typing import NamedTuple, TypeAlias, Unpack, final
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -14,6 +14,7 @@ from jaxdamp import _checks
 from jaxdamp._display import plus_minus
 from jaxdamp._one_thread import one_thread
 from jaxdamp._results import drawn_by
+from jaxdamp._settings import completed
 from jaxdamp._tables import Column, Contents, Table, plain
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import Reach, without_fitted_ranges
@@ -23,13 +24,15 @@ from jaxdamp.identify.judging import MOST_WARNINGS, fields_of_fit, on_status
 from jaxdamp.identify.noise import Noise, independent
 from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.result import Fit
-from jaxdamp.identify.search import SearchEnd, Solver
+from jaxdamp.identify.search import SearchEnd
+from jaxdamp.identify.settings import TARGETS, Free, TargetSettings
 from jaxdamp.identify.several import Solution, equally_good, search_scattered
 from jaxdamp.parameters import FreeParameters, Parameter, free_parameters, interval, match_paths, name_patterns, real
 from jaxdamp.simulation import Ride
 
 
 APART = 0.01  # relative difference of a parameter between them that is named
+Numbers: TypeAlias = Callable[[PyTree], Mapping[str, PyTree]] | Ride  # that a model has
 Goal: TypeAlias = float | int | tuple[float | int, float | int]
 
 
@@ -103,7 +106,7 @@ class TargetFit(Fit):
 class TargetResiduals(AbstractResiduals):
     """Deviations from targets in tolerances; zeros behind them, so that there are more than free numbers."""
 
-    numbers: Callable[[PyTree], Mapping[str, PyTree]] | Ride
+    numbers: Numbers
     wanted: Float[Array, " targets"]
     tolerance: Float[Array, " targets"]
     names: tuple[str, ...] = eqx.field(static=True)
@@ -131,21 +134,12 @@ class TargetResiduals(AbstractResiduals):
 @of_known_numbers
 @one_thread()
 def fit_targets(
-    numbers: Callable[[PyTree], Mapping[str, PyTree]] | Ride,
+    numbers: Numbers,
     start: PyTree,
     targets: Mapping[str, Goal],
     *,
-    over: Sequence[str] | None = None,
-    freeze: Sequence[str] = (),
-    bounds: Mapping[str, tuple[float, float]] | None = None,
-    tie: Mapping[str, str] | None = None,
     tolerance: float = 0.01,
-    loss: str = "squares",
-    priors: Mapping[str, tuple[float, float]] | None = None,
-    max_steps: int = 100,
-    starts: int = 4,
-    seed: int = 0,
-    solver: Solver | None = None,
+    **settings: Unpack[TargetSettings],
 ) -> TargetFit:
     """Find the parameters with which a model has given numbers, by least squares in units of the tolerances.
 
@@ -155,18 +149,10 @@ def fit_targets(
         start: the model to start from: a vehicle, a law, any module with parameters; or a mapping of names to numbers,
             which `numbers` then gets.
         targets: name to wanted value, or to `(value, tolerance)`.
-        over: parameters to change, by path, last part or pattern; all if left out.
-        freeze: parameters to hold.
-        bounds: extra limits `{name: (lower, upper)}`.
-        tie: parameters that take the values of others, as in `fit`.
         tolerance: of targets without one of their own, relative to their value.
-        loss: as in `fit`: "huber", "soft_l1" or "student_t" if some targets may be wrong.
-        priors: as in `fit`.
-        max_steps: largest number of steps.
-        starts: number of searches, the first from `start`, the others from parameters up to twice and half of it. The
-            first one counts unless another one meets the targets better.
-        seed: of the other starts.
-        solver: as in `fit`.
+        settings: keywords, all optional: `over`, `freeze`, `bounds`, `tie`, `priors` (see `Free`); `loss`, robust if
+            some targets may be wrong, and `max_steps`, 100 if left out (see `Search`); `starts`, 4 if left out, `seed`
+            and `solver` (see `TargetSettings`).
 
     Returns:
         The model, its parameters and the numbers reached. Targets outside their tolerance are named by a warning, and
@@ -185,11 +171,13 @@ def fit_targets(
     >>> [(target.name, round(target.value, 4), target.met) for target in result.targets]
     [('frequency', 1.2, True), ('damping ratio', 0.3, True)]
     """
+    asked = completed(fit_targets, settings, TARGETS)
     goals = _goals(targets, tolerance)
+    loss, starts, priors, max_steps = asked["loss"], asked["starts"], asked["priors"] or {}, asked["max_steps"]
     _checks.one_of("loss", loss, LOSSES)
     _checks.counts(starts=starts, max_steps=max_steps)
-    free = _free(start, over, freeze, bounds, tie)
-    expected = priors_on(free, priors or {}, 1.0)
+    free = _free(start, asked)
+    expected = priors_on(free, priors, 1.0)
     padding = max(free.values.size + 1 - len(goals), 0)
     wanted, allowed = (jnp.asarray(np.array(column, float)) for column in zip(*goals.values(), strict=True))
     residuals = TargetResiduals(numbers, wanted, allowed, tuple(goals), padding)
@@ -198,13 +186,13 @@ def fit_targets(
     owner = np.zeros(len(goals) + padding + sum(part.size for part in expected), int)
     everywhere, parts = Reach(np.inf, np.inf), (residuals, *expected)
     problem = Problem(free, parts, level, (), (1.0,), owner, everywhere, free.tree, (), False)
-    by_squares = functools.partial(search_scattered, seed=seed, max_steps=max_steps, solver=solver)
+    by_squares = functools.partial(search_scattered, seed=asked["seed"], max_steps=max_steps, solver=asked["solver"])
     problem, solution = solve_by(problem, by_squares, loss=loss, noise=_tolerances, starts=starts, spread=1.0)
     if not solution.best.finite:
         remedy = "Start nearer to the targets, or give `bounds`."
         _checks.refuse("numbers", "give finite numbers and derivatives", "one that does not", remedy)
     result = _judged(problem.started_at(solution.best.values), solution, goals, residuals)
-    return dataclasses.replace(result, criterion=criterion_in_words(problem, loss, priors or {}))
+    return dataclasses.replace(result, criterion=criterion_in_words(problem, loss, priors))
 
 
 def _judged(
@@ -269,19 +257,14 @@ def _goals(targets: Mapping[str, Goal], tolerance: float) -> dict[str, tuple[flo
     return goals
 
 
-def _free(
-    start: PyTree,
-    over: Sequence[str] | None,
-    freeze: Sequence[str],
-    bounds: Mapping[str, tuple[float, float]] | None,
-    tie: Mapping[str, str] | None,
-) -> FreeParameters:
+def _free(start: PyTree, asked: Free) -> FreeParameters:
     """The free numbers of a module or a mapping."""
-    if not isinstance(start, Mapping):
-        return free_parameters(without_fitted_ranges(start), over=over, freeze=freeze, bounds=bounds, tie=tie)
-    if tie:
-        _checks.refuse("tie", "be left out for a mapping of numbers", tie, "Use one name in `numbers` twice.")
-    return _free_numbers(start, over, freeze, bounds or {})
+    over, freeze, bounds, tie = asked["over"], asked["freeze"], asked["bounds"], asked["tie"]
+    if isinstance(start, Mapping):
+        if tie:
+            _checks.refuse("tie", "be left out for a mapping of numbers", tie, "Use one name in `numbers` twice.")
+        return _free_numbers(start, over, freeze, bounds or {})
+    return free_parameters(without_fitted_ranges(start), over=over, freeze=freeze, bounds=bounds, tie=tie)
 
 
 def _free_numbers(

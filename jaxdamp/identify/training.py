@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Protocol, runtime_checkable
+from typing import Protocol, TypedDict, Unpack, runtime_checkable
 
 import equinox as eqx
 import jax
@@ -14,6 +14,7 @@ from jaxtyping import Array, Float, PyTree
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
 from jaxdamp._results import drawn_by
+from jaxdamp._settings import completed
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Contents, Table, with_unit
 from jaxdamp._traced import of_known_numbers
@@ -45,6 +46,23 @@ class Optimiser(Protocol):
         ...
 
 
+class TrainSettings(TypedDict, total=False):
+    """The keywords that `train` has from `fit`.
+
+    Arguments:
+        freeze: parameters to hold at their start, as in `Free`.
+        tie: parameters that take the values of others, as in `Free`.
+        weighting: of `runs`, as in `ProblemSettings`.
+        samples_per_cycle: slow records are averaged in blocks down to this number.
+    """
+
+    freeze: Sequence[str]
+    tie: Mapping[str, str] | None
+    weighting: str | Sequence[float]
+    samples_per_cycle: int
+
+
+TRAIN: TrainSettings = {"freeze": (), "tie": None, "weighting": "samples", "samples_per_cycle": 200}
 CHUNK = 25  # steps in one compiled call, after which the held-out records are evaluated
 
 
@@ -114,14 +132,11 @@ def train(
     *,
     held_out: BenchRun | Iterable[BenchRun],
     rig: Machine = None,
-    weighting: str | Sequence[float] = "samples",
-    freeze: Sequence[str] = (),
-    tie: Mapping[str, str] | None = None,
     steps: int = 2000,
     patience: int = 400,
     learning_rate: float = 0.02,
     optimiser: Optimiser | None = None,
-    samples_per_cycle: int = 200,
+    **settings: Unpack[TrainSettings],
 ) -> Training:
     """Train a law with many weights, such as `Hybrid`, by gradient descent with early stopping.
 
@@ -137,14 +152,12 @@ def train(
         runs: records to train on. A few steady cycles of each are enough: `run.last_cycles(3)`.
         held_out: records that decide when to stop; they are not trained on. To assess the law, use further records.
         rig: the test machine as in `fit`, trained together with the law.
-        weighting: of `runs`, as in `fit`.
-        freeze: parameters to hold at their start, by path, last part of a path, or pattern.
-        tie: parameters that take the values of others, as in `fit`.
         steps: largest number of steps.
         patience: number of steps without a decrease of the held-out error after which the training stops.
         learning_rate: initial learning rate of Adam; it decreases to a hundredth along a cosine over `steps`.
         optimiser: any optax optimiser instead.
-        samples_per_cycle: slow records are averaged in blocks down to this number.
+        settings: keywords of `fit`, all optional: `freeze`, `tie`, `weighting`, and `samples_per_cycle`, 200 if left
+            out (see `TrainSettings`).
 
     Raises:
         ValueError: no records on either side, a record on both; a law without finite forces; names that fit no
@@ -158,13 +171,13 @@ def train(
     >>> trained.held_out_fit_percent > 90.0
     True
     """
+    asked = completed(train, settings, TRAIN)
     runs, held_out = as_runs(runs, call="train(law, runs, held_out=...)"), as_runs(held_out, "held_out")
     _check(runs, held_out, steps, patience)
     _checks.positive("learning_rate", learning_rate)
-    options = {"freeze": freeze, "tie": tie, "weighting": weighting, "samples_per_cycle": samples_per_cycle}
-    problem = prepare(law, runs, rig=rig, **options)
+    problem = prepare(law, runs, rig=rig, **asked)
     coordinates, used, start = Coordinates(problem.free, smooth="all"), problem.residuals, problem.free.tree
-    checked = batches(start, held_out, [1.0] * len(held_out), samples_per_cycle)[0]
+    checked = batches(start, held_out, [1.0] * len(held_out), asked["samples_per_cycle"])[0]
     level = float(np.sqrt(np.mean(np.concatenate([run.force for run in problem.fitted_to]) ** 2)))
     rule = _adam(learning_rate, steps) if optimiser is None else optimiser
 

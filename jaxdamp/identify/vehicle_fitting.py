@@ -4,7 +4,7 @@ import dataclasses
 import functools
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Unpack
 
 import jax.numpy as jnp
 import numpy as np
@@ -13,6 +13,7 @@ from jaxtyping import Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._one_thread import one_thread
+from jaxdamp._settings import completed
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, priors_on, solve_by
@@ -22,7 +23,8 @@ from jaxdamp.identify.machine import Machine, started_machine
 from jaxdamp.identify.model import VehicleTest, own_names
 from jaxdamp.identify.noise import Noise, channel_noise
 from jaxdamp.identify.problem import Problem
-from jaxdamp.identify.search import SearchEnd, Solver, search
+from jaxdamp.identify.search import SearchEnd, search
+from jaxdamp.identify.settings import VEHICLE, VehicleSettings
 from jaxdamp.identify.several import Solution, search_scattered
 from jaxdamp.identify.vehicle_left_out import friction_left_out, on_free_scale, on_sensors, on_signs, on_units
 from jaxdamp.identify.vehicle_preparing import (
@@ -61,22 +63,10 @@ def fit_vehicle(
     sensors: Mapping[str, Sensor] | None = None,
     bench: Mapping[str, Iterable[BenchRun]] | None = None,
     rig: Machine = None,
-    over: Sequence[str] | None = None,
-    freeze: Sequence[str] = (),
-    bounds: Mapping[str, tuple[float, float]] | None = None,
-    tie: Mapping[str, str] | None = None,
-    per_record: Sequence[str] = (),
     start: str = "rest",
     settling: float | int = 0.0,
     noise: Mapping[str, float] | None = None,
-    dt: float | None = None,
-    samples_per_cycle: int | None = 400,
-    loss: str = "squares",
-    priors: Mapping[str, tuple[float, float]] | None = None,
-    starts: int = 1,
-    seed: int = 0,
-    max_steps: int = 100,
-    solver: Solver | None = None,
+    **settings: Unpack[VehicleSettings],
 ) -> VehicleFit:
     """Fit masses, rates, friction and damper laws of a vehicle to records of its motion.
 
@@ -97,27 +87,14 @@ def fit_vehicle(
             a `MotionRatio` or a `Linkage`. They are fitted together with the records of the vehicle; dampers that
             share a law are tied by `tie`.
         rig: test machine of the bench records, as in `fit`: a `Rig`, or names such as "gas,friction".
-        over: parameters of the vehicle to fit, by path, last part or pattern; all if left out.
-        freeze: parameters to hold at their start, also of sensors.
-        bounds: extra limits `{name: (lower, upper)}`.
-        tie: parameters that take the values of others, as in `fit`.
-        per_record: parameters with a value for each record, such as "sprung_mass" (payload) or "offset".
         start: "rest", in static equilibrium on the first heights; or "free", the initial motion of each record is
             fitted.
         settling: time at the beginning of each record that is not compared [s].
         noise: standard deviation of channels in their SI unit, where it is known, also of a path of `bench` [N]. It
             sets the weights; standard errors follow from the residual.
-        dt: longest step of the simulation [s], 1 ms if left out. Records with a longer sampling interval are simulated
-            in fractions of it. Between the samples the road is a smooth curve through the measured heights.
-        samples_per_cycle: of bench records, as in `fit`.
-        loss: as in `fit`: "huber", "soft_l1" or "student_t" for channels with spikes and dropouts.
-        priors: as in `fit`; one on a mass shows the scale.
-        starts: number of searches, the first from `vehicle`, the others from parameters up to twice and half of those
-            that it ends at, with the noise that it finds. The first one counts unless another one fits better; `minima`
-            describes the others.
-        seed: of the other starts.
-        max_steps: largest number of steps of each search.
-        solver: as in `fit`.
+        settings: keywords, all optional: `over`, `freeze`, `bounds`, `tie`, `priors` (see `Free`), `loss`, robust for
+            channels with spikes and dropouts, and `max_steps`, 100 if left out (see `Search`); `per_record`, `dt`,
+            `samples_per_cycle`, `starts`, 1 if left out, `seed` and `solver` (see `VehicleSettings`).
 
     Returns:
         The fitted vehicle, its parameters with standard errors, scores of each channel, warnings.
@@ -128,9 +105,12 @@ def fit_vehicle(
 
     `docs/vehicle_fits.md` shows an example.
     """
+    asked = completed(fit_vehicle, settings, VEHICLE)
     check_module("vehicle", vehicle, (AbstractVehicle,), "fit_vehicle(vehicle, records)")
+    over, freeze, bounds, per_record = asked["over"], asked["freeze"], asked["bounds"], asked["per_record"]
+    loss, priors = asked["loss"], asked["priors"] or {}
     rides = checked_records(vehicle, records)
-    _checks.counts(max_steps=max_steps, starts=starts)
+    _checks.counts(max_steps=asked["max_steps"], starts=asked["starts"])
     _checks.one_of("loss", loss, LOSSES)
     _checks.nonnegative("settling", settling)
     if settling > 0.5 * min(len(ride) * ride.dt for ride in rides):
@@ -141,38 +121,38 @@ def fit_vehicle(
     varied = per_record_paths(model, per_record, len(rides))
     spread = with_values(model, {path: jnp.full(len(rides), get(model, path)) for path in varied})
     named = own_names(model)
-    limits, ties = named.find_keys("bounds", bounds), named.find_keys("tie", tie)
+    limits, ties = named.find_keys("bounds", bounds), named.find_keys("tie", asked["tie"])
     free = free_parameters(spread, freeze=frozen_paths(model, over, freeze), bounds=limits, tie=ties)
     _checks.finite("vehicle", free.values)
-    expected, drives = priors_on(free, named.find_keys("priors", priors), 1.0), drives_of(vehicle, rides, dt)
-    data = VehicleData(model, rides, drives, benches, float(settling), varied, samples_per_cycle, dt, expected)
+    expected, dt = priors_on(free, named.find_keys("priors", priors), 1.0), asked["dt"]
+    drives, per_cycle = drives_of(vehicle, rides, dt), asked["samples_per_cycle"]
+    data = VehicleData(model, rides, drives, benches, float(settling), varied, per_cycle, dt, expected)
     data = data.with_known_noise(noise or {})
     free = in_units(free, vehicle.units)
     problem = data.problem(free, data.first_noise())
     first = search(problem, 1)
     scale, at_start = free_scale(problem, first), channel_scores(problem, first.residual, rides)
     problem = problem._replace(free=without(free, scale.held))
-    how = {"loss": loss, "starts": starts, "max_steps": max_steps, "seed": seed, "solver": solver}
     begin = np.asarray(problem.free.values)
-    problem, solution = _solved(data, problem, **how)
-    problem, solution, refused = _accepted(data, problem, solution, begin, how | {"starts": 1})
+    problem, solution = _solved(data, problem, asked)
+    problem, solution, refused = _accepted(data, problem, solution, begin, {**asked, "starts": 1})
     result = _judged(data, problem, solution, scale, at_start, refused)
-    criterion = criterion_in_words(problem, loss, priors or {})
-    words = _patterns(model, over=over or (), freeze=freeze, bounds=bounds or {}, per_record=per_record)
+    criterion = criterion_in_words(problem, loss, priors)
+    words = _patterns(model, asked)
     return dataclasses.replace(result, patterns=words, criterion=criterion)
 
 
-def _patterns(model: VehicleTest, over: Sequence[str], **names: Iterable[str]) -> str:
+def _patterns(model: VehicleTest, asked: VehicleSettings) -> str:
     """What each pattern in the call stood for, in words."""
     paths = [p.path for p in parameters(model)]
-    of_vehicle = matched_in_words([path for path in paths if path.startswith("vehicle.")], over=over)
-    return "; ".join(filter(None, (of_vehicle, matched_in_words(paths, **names))))
+    of_vehicle = matched_in_words([path for path in paths if path.startswith("vehicle.")], over=asked["over"])
+    others = matched_in_words(paths, **{name: asked[name] for name in ("freeze", "bounds", "per_record")})
+    return "; ".join(filter(None, (of_vehicle, others)))
 
 
-def _solved(
-    data: VehicleData, problem: Problem, *, loss: str, starts: int, max_steps: int, seed: int, solver: Solver | None
-) -> tuple[Problem, Solution]:
+def _solved(data: VehicleData, problem: Problem, asked: VehicleSettings) -> tuple[Problem, Solution]:
     """The minimum with each channel weighted by its noise, which is estimated until it is consistent."""
+    loss, starts, max_steps, solver = asked["loss"], asked["starts"], asked["max_steps"], asked["solver"]
     sigma = dict(zip(data.channels, problem.sigma, strict=True))
     rounds = 0
     while True:
@@ -184,7 +164,7 @@ def _solved(
         problem = data.problem(problem.free.started_at(end.values), sigma)
     if not end.finite or (loss == "squares" and starts == 1 and not data.priors):
         return problem, Solution(end, (end,), 1)
-    by_squares = functools.partial(search_scattered, seed=seed, max_steps=max_steps, solver=solver)
+    by_squares = functools.partial(search_scattered, seed=asked["seed"], max_steps=max_steps, solver=solver)
     return solve_by(problem.started_at(end.values), by_squares, loss=loss, noise=_noise, starts=starts)
 
 
@@ -197,7 +177,7 @@ def _accepted(
     problem: Problem,
     solution: Solution,
     start: Float[np.ndarray, " free"],
-    how: Mapping[str, Any],
+    asked: VehicleSettings,
 ) -> tuple[Problem, Solution, list[str]]:
     """The minimum among the vehicles that `simulate` accepts, as it does the start, with the substeps they need."""
     notes = list[str]()
@@ -232,7 +212,7 @@ def _accepted(
             )
         sigma = dict(zip(data.channels, problem.sigma, strict=True))
         begin = problem.free if drives is None else problem.free.started_at(end.values)
-        problem, solution = _solved(data, data.problem(begin, sigma), **how)
+        problem, solution = _solved(data, data.problem(begin, sigma), asked)
     return problem, solution, notes
 
 

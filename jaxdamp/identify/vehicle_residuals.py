@@ -3,7 +3,7 @@
 import dataclasses
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, Unpack, final
 
 import equinox as eqx
 import jax
@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxdamp import _checks
+from jaxdamp._settings import completed, part
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.model import VehicleTest, on_rig
@@ -20,7 +21,7 @@ from jaxdamp.identify.traces import Batch, batches, owners
 from jaxdamp.parameters import get, with_values
 from jaxdamp.rig import Sensor
 from jaxdamp.roads import AbstractRoad
-from jaxdamp.simulation import AbstractEngine, recorded, settled, simulate
+from jaxdamp.simulation import SIMULATION, AbstractEngine, SimulationSettings, recorded, settled, simulate
 from jaxdamp.vehicles import AbstractVehicle, ForceDriven, prefixed
 
 
@@ -195,22 +196,35 @@ def bench_parts(
     return parts, numbers
 
 
+class VirtualRideSettings(SimulationSettings, total=False):
+    """Further keywords of `virtual_ride`: those of `simulate` but `dt`, which follows from the record, and these.
+
+    Arguments:
+        name: name of the record; noise depends on it and on the seed only.
+        finer: steps of the simulation in a sampling interval.
+    """
+
+    name: str
+    finer: int
+
+
+WITHOUT_STEP: SimulationSettings = {**SIMULATION}
+del WITHOUT_STEP["dt"]
+VIRTUAL_RIDE: VirtualRideSettings = {**WITHOUT_STEP, "name": "virtual ride", "finer": 2}
+
+
 @of_known_numbers
 def virtual_ride(
     vehicle: AbstractVehicle,
     road: AbstractRoad,
     channels: Mapping[str, float],
     *,
-    duration: float | None = None,
     sampling_rate: float | int = 500.0,
     sensors: Mapping[str, Sensor] | None = None,
     road_noise: float = 0.0,
     driven_by: str = "heights",
-    start: Mapping[str, float] | None = None,
-    name: str = "virtual ride",
     seed: int = 0,
-    finer: int = 2,
-    **options: Any,
+    **settings: Unpack[VirtualRideSettings],
 ) -> RideRecord:
     """A record as real sensors would write it, of a simulated vehicle.
 
@@ -221,16 +235,13 @@ def virtual_ride(
         vehicle: the vehicle.
         road: a road or the motion of platforms, as in `simulate`.
         channels: the channels to measure, each with the standard deviation of its noise in its unit.
-        duration: as in `simulate`.
         sampling_rate: of the record [Hz].
         sensors: by channel, what the sensor adds.
         road_noise: standard deviation of the noise of the heights [m], or of the wheel forces [N].
         driven_by: what the record has of the road: "heights", or the "forces" on the wheels that it causes.
-        start: as in `simulate`.
-        name: name of the record; noise depends on it and on the seed only.
         seed: seed of the noise.
-        finer: steps of the simulation in a sampling interval.
-        options: further ones of `simulate`.
+        settings: keywords, all optional: `name` and `finer` (see `VirtualRideSettings`); `duration`, `start` and others
+            of `simulate` but `dt`.
 
     Returns:
         The record, with the units of the channels and the seed among its settings.
@@ -244,6 +255,8 @@ def virtual_ride(
     >>> virtual_ride(car, roads.sine(0.01, frequency=1.2), noise, duration=5.0, seed=3)
     RideRecord('virtual ride': 5.002 s at 500 Hz, 1 wheel moved by 20 mm, measured: sprung_acceleration, stroke)
     """
+    asked = completed(virtual_ride, settings, VIRTUAL_RIDE)
+    name, finer = asked["name"], asked["finer"]
     _checks.positive("sampling_rate", sampling_rate)
     _checks.nonnegative("road_noise", road_noise)
     _checks.one_of("driven_by", driven_by, ["heights", "forces"])
@@ -253,7 +266,7 @@ def virtual_ride(
     for channel in sensors or {}:
         _checks.one_of("sensors", channel, channels)
     dt = 1.0 / (finer * sampling_rate)
-    response = simulate(vehicle, road, duration=duration, dt=dt, start=start, **options)
+    response = simulate(vehicle, road, **{**part(asked, WITHOUT_STEP), "dt": dt})
     rng = np.random.default_rng([seed, zlib.crc32(name.encode())])
     shown = {}
     for channel, deviation in channels.items():

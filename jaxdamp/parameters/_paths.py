@@ -235,17 +235,17 @@ def listed(paths: Sequence[str], most: int = 6) -> str:
     return ", ".join(paths[:most]) + f" and {len(paths) - most} more" * (len(paths) > most)
 
 
-def matched_in_words(known: Sequence[str], **patterns: Iterable[str]) -> str:
+def matched_in_words(known: Sequence[str], **patterns: Iterable[str] | None) -> str:
     """What each pattern with `*` stands for, as in "freeze 'guides.*.stiffness' = guides.0.stiffness"; else empty.
 
     Arguments:
         known: all paths.
-        patterns: names and patterns by the argument that they were given for.
+        patterns: names and patterns by the argument that they were given for; None for none.
     """
     return "; ".join(
         f"{argument} {pattern!r} = {listed(matching(known, pattern))}"
         for argument, given in patterns.items()
-        for pattern in ([given] if isinstance(given, str) else given)
+        for pattern in ([given] if isinstance(given, str) else given or ())
         if "*" in pattern
     )
 

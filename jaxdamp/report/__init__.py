@@ -24,6 +24,7 @@ from jaxdamp.report.benches import (
 )
 from jaxdamp.report.chains import FitPart as FitPart, chain_report, result_report
 from jaxdamp.report.fits import (
+    FitPage as FitPage,
     add_fits as add_fits,
     add_other_fits as add_other_fits,
     failure_sentences as failure_sentences,
@@ -32,7 +33,7 @@ from jaxdamp.report.fits import (
     fitted_velocities as fitted_velocities,
     parameters_of as parameters_of,
 )
-from jaxdamp.report.page import Attempts as Attempts, Report
+from jaxdamp.report.page import Attempts as Attempts, Page as Page, Report
 from jaxdamp.report.rides import (
     add_rides as add_rides,
     axles_sentence as axles_sentence,

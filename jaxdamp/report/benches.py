@@ -3,12 +3,13 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Unpack
 
 from jaxdamp._tables import Cell, Column, Compared, Table, comparison_table, percent_change
 from jaxdamp.bench import BenchRun, Evaluation, ForceVelocityTable, LimitCheck, Preflight, evaluate
 from jaxdamp.dampers import AbstractDamper, FittedRange
 from jaxdamp.identify import predict_runs
-from jaxdamp.report.page import Attempts, Report
+from jaxdamp.report.page import Attempts, Page, Report
 from jaxdamp.simulation import Response
 
 
@@ -100,10 +101,8 @@ def bench_report(
     limits: LimitCheck | None = None,
     *,
     baseline: Evaluation | AbstractDamper | None = None,
-    title: str = "Damper records",
     remarks: Sequence[str] = (),
-    folder: Path | None = None,
-    attempts: Attempts | None = None,
+    **page: Unpack[Page],
 ) -> Report:
     """A page on records: preflight, limits, forces, rates, gas force and friction, loops.
 
@@ -112,10 +111,8 @@ def bench_report(
         preflight: of `bench.preflight`.
         limits: of `evaluation.check`.
         baseline: another evaluation to draw beneath, or a law, which is put on the bench with the same motions.
-        title: of the page.
         remarks: on the records.
-        folder: for the pictures as files of their own; in the page alone if it is left out.
-        attempts: what may fail by itself; new ones if left out.
+        page: `title`, `folder` and `attempts`, all optional (see `Page`).
 
     >>> from jaxdamp import bench, report
     >>> from jaxdamp.dampers import Bilinear
@@ -124,7 +121,7 @@ def bench_report(
     >>> "Forces at stated velocities" in page.to_html()
     True
     """
-    report = Report(title, folder, attempts)
+    report = Report.by(bench_report, "Damper records", page)
     if isinstance(baseline, AbstractDamper):
         baseline = law_evaluation(baseline, evaluation)
     sentences = bench_verdict(evaluation, preflight, limits)

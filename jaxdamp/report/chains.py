@@ -3,18 +3,19 @@
 import functools
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Unpack
 
 from jaxdamp import plots
 from jaxdamp._display import Display, display, shown_in
 from jaxdamp._results import AbstractResult
 from jaxdamp._second_process import elsewhere
+from jaxdamp._settings import completed, part
 from jaxdamp.bench import BenchRun, Evaluation, Preflight
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Comparison, VehicleComparison, VehicleFit
 from jaxdamp.report.benches import add_evaluation, add_records, bench_report, bench_verdict
-from jaxdamp.report.fits import add_fits, add_other_fits, fit_report, fit_verdict
-from jaxdamp.report.page import Attempts, Report
+from jaxdamp.report.fits import FIT_PAGE, FitPage, add_fits, add_other_fits, fit_report, fit_verdict
+from jaxdamp.report.page import PAGE, Attempts, Report
 from jaxdamp.report.rides import add_rides, notes_of, ride_report, ride_verdict
 from jaxdamp.report.tunings import add_tuning, tuning_report
 from jaxdamp.report.vehicle_fits import vehicle_comparison_report, vehicle_fit_report
@@ -27,17 +28,11 @@ def chain_report(
     rides: Mapping[str, Mapping[str, Response]],
     tuned: TuneResult | None = None,
     *,
-    title: str = "From bench records to a better damper",
     sentences: Sequence[str] = (),
     sheets: bool = True,
     evaluation: Evaluation | None = None,
-    preflight: Preflight | None = None,
-    runs: Sequence[BenchRun] | None = None,
-    remarks: Sequence[str] = (),
-    baseline: AbstractDamper | None = None,
     laws: Callable[[], Report] | None = None,
-    folder: Path | None = None,
-    attempts: Attempts | None = None,
+    **page: Unpack[FitPage],
 ) -> Report:
     """A page on records, the laws fitted to them, rides on these laws, and a tuning.
 
@@ -45,17 +40,11 @@ def chain_report(
         comparison: the fits, of `identify.compare`.
         rides: for each road, by its title, the responses by name; the first is compared with the others.
         tuned: of `tune.minimise`.
-        title: of the page.
         sentences: what else its verdict says.
         sheets: one A4 page of the damper and one of the ride at the top.
         evaluation: of `bench.evaluate`.
-        preflight: of `bench.preflight`.
-        runs: the records in the order of the page; the fitted ones and those held out, if left out.
-        remarks: on the records.
-        baseline: another law, drawn over the curves and scored on the same records.
         laws: its part on records and laws, drawn by `FitPart.begun` with the same arguments; drawn now if left out.
-        folder: folder for the pictures as separate files; without it they are only in the page.
-        attempts: collects parts that fail; a new one if left out.
+        page: `title`, `folder`, `attempts`, `runs`, `remarks`, `preflight`, `baseline`, all optional (see `FitPage`).
 
     >>> from jaxdamp import bench, identify, report, roads, simulate, tune, vehicles
     >>> from jaxdamp.dampers import Bilinear
@@ -68,7 +57,8 @@ def chain_report(
     >>> "tyre load variation, RMS" in page.to_html()
     True
     """
-    report = Report(title, folder, attempts)
+    asked = completed(chain_report, page, {**FIT_PAGE, "title": "From bench records to a better damper"})
+    report, preflight, baseline = Report(**part(asked, PAGE)), asked["preflight"], asked["baseline"]
     best, *others = fit_verdict(report, comparison, baseline)
     report.verdict(
         *([tuned.verdict.sentence] if tuned else []),
@@ -81,8 +71,8 @@ def chain_report(
             *(bench_verdict(evaluation, preflight) if evaluation else []),
         ],
     )
-    part = FitPart(comparison, runs, sheets, evaluation, preflight, remarks, baseline)
-    report.include(part.drawn(report.attempts, None if folder is None else {}) if laws is None else laws())
+    fits = FitPart(comparison, asked["runs"], sheets, evaluation, preflight, asked["remarks"], baseline)
+    report.include(fits.drawn(report.attempts, None if asked["folder"] is None else {}) if laws is None else laws())
     if sheets:
         _add_ride_sheet(report, rides, tuned)
     for number, (road, ride) in enumerate(rides.items(), 1):
@@ -101,7 +91,8 @@ class FitPart(NamedTuple):
 
     Arguments:
         comparison: the fits, of `identify.compare`.
-        runs, sheets, evaluation, preflight, remarks, baseline: as in `chain_report`.
+        sheets, evaluation: as in `chain_report`.
+        runs, preflight, remarks, baseline: as in `FitPage`.
     """
 
     comparison: Comparison

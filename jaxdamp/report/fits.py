@@ -1,12 +1,13 @@
 """A page on laws fitted to records: errors, parameters, loops and curves, what the machine adds, doubts."""
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from typing import Unpack
 
 import numpy as np
 
 from jaxdamp import plots, rig
+from jaxdamp._settings import completed, part
 from jaxdamp._tables import Table
 from jaxdamp._words import in_words
 from jaxdamp.bench import BenchRun, Preflight
@@ -23,7 +24,7 @@ from jaxdamp.identify import (
 )
 from jaxdamp.parameters import parameters
 from jaxdamp.report.benches import add_records, fitted_range_table
-from jaxdamp.report.page import Attempts, Report
+from jaxdamp.report.page import PAGE, Page, Report
 
 
 def machine_sentences(result: FitResult) -> tuple[str, ...]:
@@ -66,32 +67,39 @@ BASELINE = "baseline"  # name of a law to compare with
 BAND_STEP = 10  # points of a curve from one of its band to the next
 
 
+class FitPage(Page, total=False):
+    """Keywords of `fit_report` and `chain_report`: those of `Page`, and these.
+
+    Arguments:
+        runs: the records in the order of the page; the fitted ones and those held out, if left out.
+        remarks: on the records.
+        preflight: of `bench.preflight`.
+        baseline: another law, drawn over the curves and scored on the same records.
+    """
+
+    runs: Sequence[BenchRun] | None
+    remarks: Sequence[str]
+    preflight: Preflight | None
+    baseline: AbstractDamper | None
+
+
+FIT_PAGE: FitPage = {**PAGE, "runs": None, "remarks": (), "preflight": None, "baseline": None}
+
+
 def fit_report(
     comparison: Comparison,
     *,
-    title: str = "Damper laws fitted to bench records",
-    runs: Iterable[BenchRun] | None = None,
-    remarks: Sequence[str] = (),
-    preflight: Preflight | None = None,
     failures: Sequence[str] | None = None,
-    baseline: AbstractDamper | None = None,
-    folder: Path | None = None,
-    attempts: Attempts | None = None,
     validation: CrossValidation | None = None,
+    **page: Unpack[FitPage],
 ) -> Report:
     """A page on the fits of several laws, or of one.
 
     Arguments:
         comparison: the fits, of `identify.compare`.
-        title: of the page.
-        runs: the records in the order of the page; the fitted ones and those held out, if left out.
-        remarks: on the records.
-        preflight: of `bench.preflight`.
         failures: sentences on laws without a fit, instead of those of the comparison.
-        baseline: another law, drawn over the curves and scored on the same records.
-        folder: folder for the pictures as separate files; without it they are only in the page.
-        attempts: collects parts that fail; a new one if left out.
         validation: of `identify.cross_validate`.
+        page: `title`, `folder`, `attempts`, `runs`, `remarks`, `preflight`, `baseline`, all optional (see `FitPage`).
 
     >>> from jaxdamp import bench, identify, report
     >>> from jaxdamp.dampers import Bilinear, Linear
@@ -101,12 +109,14 @@ def fit_report(
     >>> "Recommended: bilinear" in page.to_html()
     True
     """
-    report = Report(title, folder, attempts)
+    asked = completed(fit_report, page, {**FIT_PAGE, "title": "Damper laws fitted to bench records"})
+    report, runs, preflight = Report(**part(asked, PAGE)), asked["runs"], asked["preflight"]
+    baseline = asked["baseline"]
     best, *others = fit_verdict(report, comparison, baseline)
     report.verdict(best, f"{preflight.summary}." if preflight else "", more=others)
     report.sheet(lambda: comparison.plot("sheet", baseline=baseline), comparison.verdict[0], "damper_sheet")
     records = (*comparison.best.result.runs, *comparison.held_out) if runs is None else tuple(runs)
-    add_records(report, records, comparison.held_out, remarks, preflight)
+    add_records(report, records, comparison.held_out, asked["remarks"], preflight)
     add_fits(report, comparison, failures, baseline)
     if validation is not None:
         add_validation(report, validation)

@@ -9,10 +9,11 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypedDict
 
 from jaxdamp._display import display
 from jaxdamp._second_process import elsewhere
+from jaxdamp._settings import completed
 from jaxdamp._tables import Table
 from jaxdamp._types import Figure
 from jaxdamp._words import first_upper, said
@@ -131,14 +132,30 @@ class _Block(NamedTuple):
     text: Callable[[], str]
 
 
+class Page(TypedDict, total=False):
+    """Keywords of all reports.
+
+    Arguments:
+        title: of the page; that of its kind if left out.
+        folder: folder for the pictures as separate PNG files; without it they are only in the page.
+        attempts: collects parts that fail, such as a picture, which are listed at the end; a new one if left out.
+    """
+
+    title: str
+    folder: Path | None
+    attempts: Attempts | None
+
+
+PAGE: Page = {"title": "", "folder": None, "attempts": None}
+
+
 class Report:
     """Headings, sentences, tables and pictures in order, written as one HTML file.
 
     Arguments:
         title: of the page.
-        folder: folder for the pictures as separate PNG files, or a dictionary that takes their contents by name;
-            without it they are only in the page.
-        attempts: collects parts that fail, such as a picture; they are listed at the end of the page.
+        folder: as in `Page`, or a dictionary that takes the contents of the pictures by name.
+        attempts: as in `Page`.
     """
 
     def __init__(
@@ -151,6 +168,11 @@ class Report:
         self._sheets: list[str | _Block] = []
         self._blocks: list[str | _Block] = []
         self._sections: list[list[str | _Block]] = []
+
+    @classmethod
+    def by(cls, function: Callable[..., "Report"], title: str, page: Page) -> "Report":
+        """That of a function with this title if none is given."""
+        return cls(**completed(function, page, {**PAGE, "title": title}))
 
     def heading(self, text: str) -> None:
         """Start a section; the page begins with links to all of them. Below a sheet sections are folded."""

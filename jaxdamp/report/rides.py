@@ -1,7 +1,7 @@
 """A page on one or several rides: metrics, comfort, use of the dampers, pictures."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from jaxdamp.dampers import AbstractDamper, law_name
 from jaxdamp.metrics import comfort_reaction
 from jaxdamp.parameters import parameters
 from jaxdamp.report.benches import range_use_table
-from jaxdamp.report.page import Attempts, Report
+from jaxdamp.report.page import Page, Report
 from jaxdamp.simulation import Response, comfort_table, far_outside, metrics_table
 
 
@@ -27,21 +27,17 @@ WORDS = {
 def ride_report(
     responses: Response | Mapping[str, Response],
     *,
-    title: str = "Ride",
     laws: Mapping[str, AbstractDamper] | None = None,
     remarks: Sequence[str] | None = None,
-    folder: Path | None = None,
-    attempts: Attempts | None = None,
+    **page: Unpack[Page],
 ) -> Report:
     """A page on one ride, or on several of one kind of vehicle side by side, the first being the baseline.
 
     Arguments:
         responses: of `simulate`, several by name.
-        title: of the page.
         laws: the dampers by the name of their ride, to be listed.
         remarks: remarks on the results; the notes of the responses if left out.
-        folder: folder for the pictures as separate files; without it they are only in the page.
-        attempts: collects parts that fail; a new one if left out.
+        page: `title`, `folder` and `attempts`, all optional (see `Page`).
 
     >>> from jaxdamp import report, roads, simulate, vehicles
     >>> bump = roads.cosine_bump(0.05, start=0.2, duration=0.25)
@@ -50,7 +46,8 @@ def ride_report(
     True
     """
     rides = {"ride": responses} if isinstance(responses, Response) else dict(responses)
-    report = Report(title, folder, attempts)
+    title = page.get("title", "Ride")
+    report = Report.by(ride_report, title, page)
     sentences = ride_verdict(rides)
     report.verdict(*sentences)
     report.sheet(lambda: plots.ride_sheet(rides, name=title), sentences[-1], "ride_sheet")

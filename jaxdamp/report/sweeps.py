@@ -2,13 +2,13 @@
 
 import functools
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from typing import Unpack
 
 from jaxdamp import plots
 from jaxdamp._tables import percent_change, typeset_unit
 from jaxdamp._types import DataArray, Dataset, ScalarLike
 from jaxdamp._words import path_words
-from jaxdamp.report.page import Attempts, Report
+from jaxdamp.report.page import Page, Report
 from jaxdamp.sweeps import without_effect
 from jaxdamp.tune import Limits, limit_spans
 
@@ -20,27 +20,23 @@ MOST_POINTS = 1000  # in the table of a page
 def sweep_report(
     data: Dataset,
     *,
-    title: str = "Sweep",
     remarks: Sequence[str] = (),
     limits: Limits | None = None,
     baseline: Mapping[str, ScalarLike] | None = None,
     present: Mapping[str, object] | None = None,
     plane: tuple[str, str] | None = None,
-    folder: Path | None = None,
-    attempts: Attempts | None = None,
+    **page: Unpack[Page],
 ) -> Report:
     """A page on a sweep over a grid. Its table has the first thousand points, `data.jaxdamp.table()` has all.
 
     Arguments:
         data: of `jaxdamp.sweep`.
-        title: of the page.
         remarks: on the results, such as the reasons of failed points.
         limits: `{result: largest value}` or `{result: (smallest, largest)}`; hatched in maps, ringed on curves.
         baseline: results of another design by name, to which the best points are compared.
         present: the design that there is, by the names of axes and results, to be marked in the pictures.
         plane: two results that are drawn against each other, such as those of comfort and grip.
-        folder: folder for the pictures as separate files; without it they are only in the page.
-        attempts: collects parts that fail; a new one if left out.
+        page: `title`, `folder` and `attempts`, all optional (see `Page`).
 
     >>> import jaxdamp
     >>> data = jaxdamp.sweep(lambda p: {"area": p["a"] * p["b"]}, {"a": [1.0, 2.0], "b": [3.0, 4.0]})
@@ -48,7 +44,7 @@ def sweep_report(
     True
     """
     data = data.compute()  # a store is read when it is asked for
-    report = Report(title, folder, attempts)
+    report = Report.by(sweep_report, "Sweep", page)
     report.verdict(*best_points(data, limits, baseline))
     report.points(remarks)
     if len(data["failed"].dims) <= MOST_AXES:

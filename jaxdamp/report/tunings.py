@@ -1,7 +1,7 @@
 """A page on a tuning: parameters and ride metrics before and after, also on other roads."""
 
 from collections.abc import Mapping
-from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from jaxdamp import _checks, plots
 from jaxdamp._tables import Compared, Table, comparison_table, percent_change
 from jaxdamp._traced import equal
 from jaxdamp.parameters import get
-from jaxdamp.report.page import Attempts, Report
+from jaxdamp.report.page import Page, Report
 from jaxdamp.simulation import Response, Ride
 from jaxdamp.tune import Rescore, TuneResult, damper_paths
 from jaxdamp.vehicles import AbstractVehicle
@@ -21,23 +21,19 @@ MOST_COMBINATIONS = 100  # rows of choices on a page, the best first
 def tuning_report(
     result: TuneResult,
     *,
-    title: str = "Tuning",
     rescored: Rescore | None = None,
     rides: Mapping[str, Response] | None = None,
     baseline: AbstractVehicle | None = None,
-    folder: Path | None = None,
-    attempts: Attempts | None = None,
+    **page: Unpack[Page],
 ) -> Report:
     """A page on a tuning.
 
     Arguments:
         result: of `tune.minimise`.
-        title: of the page.
         rescored: the same cars on other roads, of `tune.rescore`.
         rides: responses before and after by name, to be drawn over each other.
         baseline: another vehicle of this kind, such as that of another tuning, to be compared on the same road.
-        folder: folder for the pictures as separate files; without it they are only in the page.
-        attempts: collects parts that fail; a new one if left out.
+        page: `title`, `folder` and `attempts`, all optional (see `Page`).
 
     >>> from jaxdamp import report, roads, tune, vehicles
     >>> result = tune.minimise("rms_dynamic_tyre_load", vehicles.presets.quarter_car_000(), roads.white("C", 20.0))
@@ -45,7 +41,7 @@ def tuning_report(
     >>> result.metric in page.to_html()
     True
     """
-    report = Report(title, folder, attempts)
+    report = Report.by(tuning_report, "Tuning", page)
     report.verdict(result.verdict.sentence, more=[result.ending])
     report.sheet(lambda: result.plot("sheet"), result.verdict.sentence, "ride_sheet")
     report.heading(result.verdict.outcome.value)

@@ -1,7 +1,7 @@
 """A page on a vehicle fitted to records of its motion: parameters, channels, what the records cannot show."""
 
 from collections.abc import Sequence
-from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
@@ -12,25 +12,21 @@ from jaxdamp.identify import VehicleComparison, VehicleFit, without_machine
 from jaxdamp.parameters import get
 from jaxdamp.report.benches import records_table
 from jaxdamp.report.fits import failure_sentences
-from jaxdamp.report.page import Attempts, Report
+from jaxdamp.report.page import Page, Report
 
 
 def vehicle_fit_report(
     result: VehicleFit,
     *,
-    title: str = "Vehicle fitted to records of its motion",
     remarks: Sequence[str] | None = None,
-    folder: Path | None = None,
-    attempts: Attempts | None = None,
+    **page: Unpack[Page],
 ) -> Report:
     """A page on the fit of a vehicle.
 
     Arguments:
         result: of `identify.fit(vehicle, records)`.
-        title: of the page.
         remarks: on the records; their notes if left out.
-        folder: folder for the pictures as separate files; without it they are only in the page.
-        attempts: collects parts that fail; a new one if left out.
+        page: `title`, `folder` and `attempts`, all optional (see `Page`).
 
     >>> from jaxdamp import identify, report, roads, vehicles
     >>> car = vehicles.presets.quarter_car_mathworks()
@@ -40,7 +36,7 @@ def vehicle_fit_report(
     >>> "may all be larger by one factor" in page.to_html()  # page.write("vehicle.html")
     False
     """
-    report = Report(title, folder, attempts)
+    report = Report.by(vehicle_fit_report, "Vehicle fitted to records of its motion", page)
     report.verdict(_summary(result))
     _add_fit(report, result, remarks)
     return report
@@ -49,21 +45,18 @@ def vehicle_fit_report(
 def vehicle_comparison_report(
     comparison: VehicleComparison,
     *,
-    title: str = "Vehicles fitted to records of their motion",
     remarks: Sequence[str] | None = None,
-    folder: Path | None = None,
-    attempts: Attempts | None = None,
+    **page: Unpack[Page],
 ) -> Report:
     """A page on the fits of several vehicles: the recommended one, why, and its fit.
 
     Arguments:
         comparison: of `identify.compare(vehicles, records)`.
-        title: of the page.
         remarks: on the records; their notes if left out.
-        folder: folder for the pictures as separate files; without it they are only in the page.
-        attempts: collects parts that fail; a new one if left out.
+        page: `title`, `folder` and `attempts`, all optional (see `Page`).
     """
-    report, best = Report(title, folder, attempts), comparison.best
+    report = Report.by(vehicle_comparison_report, "Vehicles fitted to records of their motion", page)
+    best = comparison.best
     report.verdict(*comparison.verdict)
     report.heading("How good the vehicles are")
     report.table(comparison.table())

@@ -21,7 +21,12 @@ from jaxdamp.rig.printed_records import (
     delayed_samples as delayed_samples,
     lagged_samples as lagged_samples,
 )
-from jaxdamp.rig.response import AbstractLawEngine as AbstractLawEngine, StartsInMotionWarning, respond
+from jaxdamp.rig.response import (
+    AbstractLawEngine as AbstractLawEngine,
+    ResponseSettings as ResponseSettings,
+    StartsInMotionWarning,
+    respond,
+)
 from jaxdamp.rig.sensor import Sensor
 
 

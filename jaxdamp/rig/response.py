@@ -11,6 +11,7 @@ from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._settings import completed
 from jaxdamp._types import Signal, SignalLike, State
 from jaxdamp.dampers import (
     AbstractDamper,
@@ -45,8 +46,26 @@ class AbstractLawEngine(eqx.Module):
         """Force [N] of a law at uniform instants [s] of a stroke [m] and its velocity [m/s], without checks."""
 
 
-class _Options(TypedDict, total=False):
-    """What `respond` takes beside the record and `return_state`, for type checkers."""
+class ResponseSettings(TypedDict, total=False):
+    """The keywords of `respond` beside the record and `return_state`.
+
+    Arguments:
+        state: states of the law at the first instant, shape (states,).
+        temperature: measured temperature of the oil [K], one value or shape (time,), in place of that which a
+            `TemperatureScaled` states and that which a `Heated` computes.
+        command: coil current, voltage or clicks, one value or shape (time,), in place of that which the law states, in
+            its unit; straight between the instants. The law has it at once: `Rig(command_lag=...).force(law, ...)` has
+            an actuator with a lag. Values up to a twentieth of the levels' range outside of the levels of a `Scheduled`
+            law, such as noise, take the nearest level.
+        substeps: steps from one instant to the next for laws with states, between which stroke and velocity are
+            interpolated by cubics. The error of a step falls with its square.
+        engine: `simulation.Exponential(substeps=...)`, the steps that the laws bring, as when it is left out; or
+            `simulation.Adaptive(...)`, a diffrax solver of their rates, as reference for stiff laws. Then the stroke
+            between two instants is the cubic with the velocities at its ends.
+        method: deprecated: `"step"` or a diffrax solver. Pass `engine`.
+        rtol: deprecated: of a `method`.
+        atol: deprecated: of a `method`.
+    """
 
     state: Float[ArrayLike, " states"] | None
     temperature: Float[ArrayLike, "..."] | None
@@ -58,6 +77,12 @@ class _Options(TypedDict, total=False):
     atol: float
 
 
+DEFAULTS: ResponseSettings = {
+    "state": None, "temperature": None, "command": None, "substeps": 1, "engine": None, "method": None, "rtol": 1e-8,
+    "atol": 1e-10,
+}  # fmt: skip
+
+
 @overload
 def respond(
     law: AbstractDamper,
@@ -66,10 +91,8 @@ def respond(
     velocity: SignalLike | None = ...,
     *,
     return_state: Literal[False] = ...,
-    **options: Unpack[_Options],
+    **settings: Unpack[ResponseSettings],
 ) -> Signal: ...
-
-
 @overload
 def respond(
     law: AbstractDamper,
@@ -78,25 +101,16 @@ def respond(
     velocity: SignalLike | None = ...,
     *,
     return_state: Literal[True],
-    **options: Unpack[_Options],
+    **settings: Unpack[ResponseSettings],
 ) -> tuple[Signal, State]: ...
-
-
 def respond(
     law: AbstractDamper,
     time: SignalLike,
     stroke: SignalLike,
     velocity: SignalLike | None = None,
     *,
-    state: Float[ArrayLike, " states"] | None = None,
     return_state: bool = False,
-    temperature: Float[ArrayLike, "..."] | None = None,
-    command: Float[ArrayLike, "..."] | None = None,
-    substeps: int = 1,
-    engine: AbstractLawEngine | None = None,
-    method: "str | diffrax.AbstractSolver | None" = None,
-    rtol: float = 1e-8,
-    atol: float = 1e-10,
+    **settings: Unpack[ResponseSettings],
 ) -> Signal | tuple[Signal, State]:
     """Force [N] of a damper law whose stroke is prescribed, as on a test bench.
 
@@ -114,22 +128,9 @@ def respond(
         stroke: stroke [m] at these instants, positive in extension, shape (time,).
         velocity: velocity [m/s], shape (time,). If it is left out, the stroke is differentiated by central
             differences, which is only good for a stroke without noise.
-        state: states of the law at the first instant, shape (states,).
         return_state: whether to return the states at the last instant too.
-        temperature: measured temperature of the oil [K], one value or shape (time,), in place of that which a
-            `TemperatureScaled` states and that which a `Heated` computes.
-        command: coil current, voltage or clicks, one value or shape (time,), in place of that which the law states, in
-            its unit; straight between the instants. The law has it at once: `Rig(command_lag=...).force(law, ...)` has
-            an actuator with a lag. Values up to a twentieth of the levels' range outside of the levels of a `Scheduled`
-            law, such as noise, take the nearest level.
-        substeps: steps from one instant to the next for laws with states, between which stroke and velocity are
-            interpolated by cubics. The error of a step falls with its square.
-        engine: `simulation.Exponential(substeps=...)`, the steps that the laws bring, as when it is left out; or
-            `simulation.Adaptive(...)`, a diffrax solver of their rates, as reference for stiff laws. Then the stroke
-            between two instants is the cubic with the velocities at its ends.
-        method: deprecated: `"step"` or a diffrax solver. Pass `engine`.
-        rtol: deprecated: of a `method`.
-        atol: deprecated: of a `method`.
+        settings: keywords, all optional: `state`, `temperature`, `command`, `substeps` and `engine` (see
+            `ResponseSettings`).
 
     Returns:
         Force [N], positive when it resists extension, shape (time,); with `return_state` a pair of it and the states
@@ -148,6 +149,9 @@ def respond(
     >>> round(float(force[0]), 6)
     120.0
     """
+    asked = completed(respond, settings, DEFAULTS)
+    state, temperature, command = asked["state"], asked["temperature"], asked["command"]
+    substeps, engine, method = asked["substeps"], asked["engine"], asked["method"]
     check_module("law", law, (AbstractDamper,), "respond(law, time, stroke, velocity)")
     instants, time, stroke = _checks.concrete(time), as_float(time), as_float(stroke)
     _check_record(instants, time, stroke, velocity)
@@ -172,7 +176,7 @@ def respond(
         check_module("engine", engine, (AbstractLawEngine,), "respond(law, time, stroke, engine=...)")
         force = engine.respond(law, time, stroke, rate)
     elif solver is not None:
-        force = solve_law(law, time, stroke, rate, solver, rtol, atol)
+        force = solve_law(law, time, stroke, rate, solver, asked["rtol"], asked["atol"])
     else:
         followed = Followed(temperature, command)
         begin = None if state is None else _checked_state(law, state, followed)

@@ -26,6 +26,12 @@ from jaxdamp.simulation.ride_metrics import (
     ride_metrics,
 )
 from jaxdamp.simulation.run import simulate
+from jaxdamp.simulation.settings import (
+    RUN as RUN,
+    SIMULATION as SIMULATION,
+    Run as Run,
+    SimulationSettings as SimulationSettings,
+)
 from jaxdamp.simulation.stability import substeps_needed
 from jaxdamp.simulation.stationary import DEVIATIONS as DEVIATIONS, stationary_notes as stationary_notes
 from jaxdamp.simulation.step_size import CoarseStepWarning, RunCheck as RunCheck, TracedStepWarning

@@ -3,7 +3,7 @@
 import functools
 import warnings
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Literal, TypedDict, Unpack, overload
+from typing import Literal, Unpack, overload
 
 import jax
 import jax.numpy as jnp
@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_field_types, check_module
+from jaxdamp._settings import completed
 from jaxdamp._traced import at_compile_time, behind, is_traced
 from jaxdamp._types import Scalar, ScalarLike, Signal
 from jaxdamp.dampers import coverage, warn_outside
@@ -24,58 +25,27 @@ from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.notes import range_sentences
 from jaxdamp.simulation.observer import recorded
 from jaxdamp.simulation.response import Response
+from jaxdamp.simulation.settings import SIMULATION, SimulationSettings
 from jaxdamp.simulation.stability import known_system, rounded_down
 from jaxdamp.simulation.step_size import RunCheck
 from jaxdamp.simulation.wheels import axle_timing, heights_under_wheels
 from jaxdamp.vehicles import AbstractVehicle, System, refuse_restless, static_equilibrium
 
 
-if TYPE_CHECKING:
-    import diffrax
-
-
-class _Options(TypedDict, total=False):
-    """What `simulate` takes beside the vehicle, the road and `return_state`, for type checkers."""
-
-    duration: float | None
-    dt: float | None
-    engine: AbstractEngine | None
-    start: Mapping[str, float] | None
-    state: RunState | None
-    substeps: int | None
-    every: int
-    method: "str | diffrax.AbstractSolver | None"
-    rtol: float | None
-    atol: float | None
-
-
 @overload
-def simulate(
-    vehicle: AbstractVehicle, road: AbstractRoad, *, return_state: Literal[False] = ..., **options: Unpack[_Options]
-) -> Response: ...
-
-
-@overload
-def simulate(
-    vehicle: AbstractVehicle, road: AbstractRoad, *, return_state: Literal[True], **options: Unpack[_Options]
-) -> tuple[Response, RunState]: ...
-
-
 def simulate(
     vehicle: AbstractVehicle,
     road: AbstractRoad,
     *,
-    duration: float | None = None,
-    dt: float | None = None,
-    engine: AbstractEngine | None = None,
-    start: Mapping[str, float] | None = None,
-    state: RunState | None = None,
-    return_state: bool = False,
-    substeps: int | None = None,
-    every: int = 1,
-    method: "str | diffrax.AbstractSolver | None" = None,
-    rtol: float | None = None,
-    atol: float | None = None,
+    return_state: Literal[False] = ...,
+    **settings: Unpack[SimulationSettings],
+) -> Response: ...
+@overload
+def simulate(
+    vehicle: AbstractVehicle, road: AbstractRoad, *, return_state: Literal[True], **settings: Unpack[SimulationSettings]
+) -> tuple[Response, RunState]: ...
+def simulate(
+    vehicle: AbstractVehicle, road: AbstractRoad, *, return_state: bool = False, **settings: Unpack[SimulationSettings]
 ) -> Response | tuple[Response, RunState]:
     """Drive a vehicle over a road.
 
@@ -92,25 +62,9 @@ def simulate(
         road: heights under its wheels over time: one track, or a left-hand and a right-hand one. It reaches one axle
             after the other, delayed by `vehicle.axle_positions` and the road's speed; `roads.delayed` has other
             delays, `roads.in_phase` none. Motions over time alone have a column for each of `vehicle.wheel_names`.
-        duration: length of the run [s]; the road's own if it has one and this is left out, or what is left of it.
-        dt: spacing of the instants [s], 1 ms if left out; for the exponential engine also its step (third order,
-            second where laws have kinks or states; 1 ms is right for cars). Where it is coarse a `CoarseStepWarning`
-            states the estimated error; what the vehicle cannot bear is refused.
-        engine: `simulation.Exponential()`, fixed steps, if left out; `simulation.Adaptive()`, a diffrax solver, such as
-            `simulation.Adaptive(diffrax.Kvaerno5())` for a stiff law; or one of your own (`docs/own_engine.md`).
-        start: coordinates [m, rad] at time zero that differ from the equilibrium, such as `{"pitch": 0.05}`; at rest.
-        state: where an earlier run of the same kind of vehicle and engine stopped.
         return_state: whether to return where this run stopped, too.
-        substeps: of the exponential engine between two instants; as many as the steepest law needs (friction at
-            standstill, a bristle, oil) if left out, so that every step is stable. The road stays straight between
-            instants. Under `jax.grad`, `jax.jvp` and `jax.vmap` they are those of the numbers that are differentiated,
-            the most of a batch. Inside `jax.jit` the numbers of a vehicle that is an argument are not known: pass
-            `substeps` (`simulation.substeps_needed`), or a `TracedStepWarning` says what is assumed.
-        every: save every so many-th instant only, of long runs. The motion is the same, but metrics and the energy
-            balance then know no more than what is saved; `Ride` gathers metrics at every instant and saves none.
-        method: deprecated: `"exponential"`, `"diffrax"` or a solver of diffrax. Pass `engine`.
-        rtol: deprecated: of a `method`.
-        atol: deprecated: of a `method`.
+        settings: keywords, all optional: `duration`, `dt` and `engine` (see `Run`); `start`, `state`, `substeps` and
+            `every` (see `SimulationSettings`).
 
     A damper that leaves the range that its law was fitted to (`law.fitted_to`) gives an `OutsideFittedRangeWarning`
     and a sentence in `response.notes`; `response.range_use()` has the numbers.
@@ -131,13 +85,16 @@ def simulate(
     >>> round(float(response.metrics()["working_space_peak_to_peak"]), 3)
     0.072
     """
+    asked = completed(simulate, settings, SIMULATION)
+    duration, dt, engine, substeps = asked["duration"], asked["dt"], asked["engine"], asked["substeps"]
+    start, state, every = asked["start"], asked["state"], asked["every"]
     check_module("vehicle", vehicle, (AbstractVehicle,), "simulate(vehicle, road)")
     check_module("road", road, (AbstractRoad,), "simulate(vehicle, road)")
     refuse_stacked(vehicle)
     if engine is not None:
         check_module("engine", engine, (AbstractEngine,), "simulate(vehicle, road, engine=...)")
-    if method is not None or rtol is not None or atol is not None:
-        engine = _by_method(engine, method, rtol, atol, substeps)
+    if any(asked[name] is not None for name in ("method", "rtol", "atol")):
+        engine = _by_method(asked)
         substeps = None
     engine, dt = chosen_engine(engine, Exponential(substeps=substeps), dt, substeps)
     system = vehicle.system()
@@ -215,16 +172,11 @@ def _edges(
     return RoadEdges(before, after)
 
 
-def _by_method(
-    engine: AbstractEngine | None,
-    method: "str | diffrax.AbstractSolver | None",
-    rtol: float | None,
-    atol: float | None,
-    substeps: int | None,
-) -> AbstractEngine:
+def _by_method(asked: SimulationSettings) -> AbstractEngine:
     """The engine that a deprecated `method` means."""
-    if engine is not None:
-        _checks.refuse("engine", "be given without `method`, `rtol` and `atol`", repr(engine))
+    method, rtol, atol = asked["method"], asked["rtol"], asked["atol"]
+    if asked["engine"] is not None:
+        _checks.refuse("engine", "be given without `method`, `rtol` and `atol`", repr(asked["engine"]))
     if isinstance(method, str):
         _checks.one_of("method", method, ["exponential", "diffrax"])
     instead = "`engine=simulation.Adaptive(solver, rtol=..., atol=...)` or `engine=simulation.Exponential()`"
@@ -232,7 +184,7 @@ def _by_method(
         f"`method`, `rtol` and `atol` of `simulate` are deprecated: pass {instead}.", DeprecationWarning, stacklevel=3
     )
     if method is None or method == "exponential":
-        return Exponential(substeps=substeps)
+        return Exponential(substeps=asked["substeps"])
     solver = None if isinstance(method, str) else method
     return Adaptive(solver, 1e-8 if rtol is None else rtol, 1e-10 if atol is None else atol)
 

@@ -4,7 +4,7 @@ from jaxdamp.sweeps.axes import points, random, sobol, without_effect as without
 from jaxdamp.sweeps.block_program import block_program
 from jaxdamp.sweeps.function import SweepFunction as SweepFunction
 from jaxdamp.sweeps.summary import Summary, SweepSummary as SweepSummary
-from jaxdamp.sweeps.sweeping import sweep
+from jaxdamp.sweeps.sweeping import SweepSettings as SweepSettings, sweep
 
 
 __all__ = [

@@ -14,6 +14,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress, tell
+from jaxdamp._settings import completed
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import DataArray, Dataset
 from jaxdamp._writing import whole
@@ -34,8 +35,24 @@ CHECKSUMS = "checksums"  # attribute: of each block of points
 BLOCK = 4096  # points
 
 
-class _Options(TypedDict, total=False):
-    """What `sweep` takes beside function, points and `summary`, for type checkers."""
+class SweepSettings(TypedDict, total=False):
+    """The keywords of `sweep` beside function, points and `summary`.
+
+    Arguments:
+        chunk: points computed side by side on one device; chosen to fit into the memory if left out.
+        devices: how many devices (of each process), or which; all of them if left out.
+        gradients: also the exact derivative of each scalar result `r` by each axis, as `d_r` along the dimension
+            `parameter`. True chooses between `"forward"`, for few axes, and `"reverse"`, for many, which needs more
+            memory.
+        file: for the results; the same sweep goes on from it after an interruption. A netCDF file (`.nc`) is written
+            every ten seconds or so. A Zarr store (`.zarr`, a folder) is written block by block, and of all points only
+            those of a block are held in memory: for sweeps of any size.
+        cluster: who computes the blocks of a `.zarr` store, all of this machine's devices if left out: a Dask `Client`,
+            an executor of `concurrent.futures`, or a part of an array job such as "3/16", which leaves the other parts
+            to calls in other processes.
+        progress: called with the number of points done and of all points, of this part in an array job; a line in the
+            terminal if it is left out.
+    """
 
     chunk: int | None
     devices: int | Sequence[object] | None
@@ -45,25 +62,27 @@ class _Options(TypedDict, total=False):
     progress: Callable[[int, int], None] | None
 
 
+DEFAULTS: SweepSettings = {
+    "chunk": None, "devices": None, "gradients": False, "file": None, "cluster": None, "progress": None
+}  # fmt: skip
 Over = Mapping[str, object] | AbstractPoints
 
 
 @overload
-def sweep(function: PointFunction, over: Over, *, summary: None = None, **options: Unpack[_Options]) -> Dataset: ...
+def sweep(
+    function: PointFunction, over: Over, *, summary: None = None, **settings: Unpack[SweepSettings]
+) -> Dataset: ...
 @overload
-def sweep(function: PointFunction, over: Over, *, summary: Summary, **options: Unpack[_Options]) -> SweepSummary: ...
+def sweep(
+    function: PointFunction, over: Over, *, summary: Summary, **settings: Unpack[SweepSettings]
+) -> SweepSummary: ...
 @of_known_numbers
 def sweep(
     function: PointFunction,
     over: Mapping[str, object] | AbstractPoints,
     *,
-    chunk: int | None = None,
-    devices: int | Sequence[object] | None = None,
-    gradients: Gradients = False,
-    file: str | os.PathLike[str] | None = None,
-    cluster: Cluster = None,
     summary: Summary | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    **settings: Unpack[SweepSettings],
 ) -> "Dataset | SweepSummary":
     """Compute a function at every point of a grid, a list or a sample: all cores, or all GPUs, many points at a time.
 
@@ -85,22 +104,11 @@ def sweep(
             that can be computed.
         over: values for each axis, whose every combination is taken (the last axis runs fastest); or
             `jaxdamp.sweeps.points`, `random` or `sobol`. The function gets them as floating numbers.
-        chunk: points computed side by side on one device; chosen to fit into the memory if left out.
-        devices: how many devices (of each process), or which; all of them if left out.
-        gradients: also the exact derivative of each scalar result `r` by each axis, as `d_r` along the dimension
-            `parameter`. True chooses between `"forward"`, for few axes, and `"reverse"`, for many, which needs more
-            memory.
-        file: for the results; the same sweep goes on from it after an interruption. A netCDF file (`.nc`) is written
-            every ten seconds or so. A Zarr store (`.zarr`, a folder) is written block by block, and of all points only
-            those of a block are held in memory: for sweeps of any size.
-        cluster: who computes the blocks of a `.zarr` store, all of this machine's devices if left out: a Dask `Client`,
-            an executor of `concurrent.futures`, or a part of an array job such as "3/16", which leaves the other parts
-            to calls in other processes.
         summary: what is kept instead of all results: statistics, and the histograms, best points and Pareto set that a
             `sweeps.Summary` names, gathered block by block, so that 1e9 points take the memory of a block. A `.zarr`
             store then has one text for each block.
-        progress: called with the number of points done and of all points, of this part in an array job; a line in the
-            terminal if it is left out.
+        settings: keywords, all optional: `chunk` and `devices` say where points are computed, `gradients` what else,
+            `file` and `cluster` how a sweep goes on and is shared, `progress` who is told (see `SweepSettings`).
 
     Returns:
         The results by name with the axes as dimensions (for a list, along `point`). Of a `Ride`, `attrs["loop"]` says
@@ -117,8 +125,10 @@ def sweep(
     >>> float(data["product"].sel(a=2.0, b=5.0))
     10.0
     """
+    asked = completed(sweep, settings, DEFAULTS)
+    gradients, file, cluster, progress = asked["gradients"], asked["file"], asked["cluster"], asked["progress"]
     _check_call(function, gradients, file, by_block=cluster is not None or (file is not None and summary is not None))
-    computation = Computation(function, as_points(over), gradients, chunk, devices)
+    computation = Computation(function, as_points(over), gradients, asked["chunk"], asked["devices"])
     if summary is not None:
         return summarise(BlockProgram(computation), summary, None if file is None else str(file), cluster, progress)
     if file is not None and Path(file).suffix == ".zarr":

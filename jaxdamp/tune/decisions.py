@@ -15,6 +15,7 @@ from jaxdamp._field_types import check_module
 from jaxdamp._jacobian import with_jacobian
 from jaxdamp._progress import Progress
 from jaxdamp._results import AbstractResult, drawn_by
+from jaxdamp._settings import completed
 from jaxdamp._tables import Column, Contents, Table, plain, typeset_unit
 from jaxdamp._traced import equal, of_known_numbers
 from jaxdamp.dampers import AbstractDamper
@@ -24,7 +25,7 @@ from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride
 from jaxdamp.tune.scenario_ride import ScenarioRide
 from jaxdamp.tune.scenarios import Road, Scenarios
-from jaxdamp.tune.settings import RUN, Run, completed
+from jaxdamp.tune.settings import RUN, Run
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -183,7 +184,7 @@ def compare_dampers(
     >>> round(compared.difference("rms_sprung_acceleration").change, 2)
     -8.68
     """
-    driven = completed("compare_dampers", run, RUN)
+    driven = completed(compare_dampers, run, RUN)
     _check(dampers, vehicle, roads)
     listed = [roads] if isinstance(roads, WhiteRoad) else list(roads)
     by_damper, warnings, units, first = {}, [], {}, None

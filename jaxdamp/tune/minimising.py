@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp._progress import Progress
+from jaxdamp._settings import completed
 from jaxdamp._status import Status
 from jaxdamp._tables import typeset_unit
 from jaxdamp._traced import of_known_numbers
@@ -24,7 +25,7 @@ from jaxdamp.tune.rescoring import Rescore, driver, on_fresh_roads
 from jaxdamp.tune.result import Attempt, Drive, ScenarioValues, TuneResult, V
 from jaxdamp.tune.scenario_ride import ScenarioRide, exact
 from jaxdamp.tune.scenarios import Road, Scenarios
-from jaxdamp.tune.settings import DEFAULTS, Asked, Settings, completed
+from jaxdamp.tune.settings import DEFAULTS, Settings
 from jaxdamp.tune.task import DesignTask, Evaluator, check_call, is_white
 from jaxdamp.tune.verdict import (
     active_words,
@@ -111,7 +112,7 @@ def minimise(
     >>> bounded.parameters[0].note
     'at its upper bound'
     """
-    asked = completed("minimise", settings, DEFAULTS)
+    asked = completed(minimise, settings, DEFAULTS)
     check_objective("metric", metric, "The call is `minimise(metric, vehicle, road)`.")
     check_call("minimise(metric, vehicle, road)", vehicle, road, asked)
     task = DesignTask([metric], vehicle, road, argument="metric", settings=asked)
@@ -199,7 +200,7 @@ def _result(
     attempts: tuple[Attempt, ...],
     limits: tuple[Sequence[Limit], Sequence[Limit]],
     fresh: Rescore | None,
-    asked: Asked,
+    asked: Settings,
 ) -> TuneResult[V]:
     """The result of a tuning, judged: what holds it, what it misses, and what it is worth on fresh roads.
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
+from jaxdamp._settings import completed
 from jaxdamp._status import Status
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, current_name
@@ -22,7 +23,7 @@ from jaxdamp.tune.ranges import SearchRange, start_points
 from jaxdamp.tune.rescoring import other_roads
 from jaxdamp.tune.result import V
 from jaxdamp.tune.scenarios import Road, Scenarios
-from jaxdamp.tune.settings import DEFAULTS, Settings, completed
+from jaxdamp.tune.settings import DEFAULTS, Settings
 from jaxdamp.tune.task import DesignTask, Evaluator, check_call
 from jaxdamp.tune.tracing import NO_CONFLICT, FrontProblem, lattice, range_of, trace_front
 from jaxdamp.tune.verdict import missed_notes
@@ -84,7 +85,7 @@ def pareto(
     >>> [round(float(rate), -1) for rate in front.designs[[0, -1], 0]]  # the two optima: 4656.4 and 5536.5
     [4660.0, 5540.0]
     """
-    asked = completed("pareto", settings, DEFAULTS | {"fresh_roads": FRESH_ROADS, "max_steps": MAX_STEPS})
+    asked = completed(pareto, settings, DEFAULTS | {"fresh_roads": FRESH_ROADS, "max_steps": MAX_STEPS})
     _check(objectives, vehicle, road, points, asked | {"points": points, "between": between})
     task = DesignTask(objectives, vehicle, road, argument="objectives", settings=asked)
     names, space, evaluator = task.objective.names, task.space, Evaluator(task, LANES)

@@ -13,6 +13,7 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._pieces import piece
 from jaxdamp._results import AbstractResult, drawn_by
+from jaxdamp._settings import completed
 from jaxdamp._tables import Column, Compared, Contents, Table, comparison_table, plain
 from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric
@@ -22,7 +23,7 @@ from jaxdamp.tune.limits import LimitRange
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.scenario_ride import exact
 from jaxdamp.tune.scenarios import Road, Scenarios
-from jaxdamp.tune.settings import RUN, Run, completed
+from jaxdamp.tune.settings import RUN, Run
 from jaxdamp.tune.verdict import decided, half_interval
 from jaxdamp.vehicles import AbstractVehicle, frequency_response, linearise
 
@@ -207,7 +208,7 @@ def rescore(
     metrics += [m for m in (objective.metrics if objective else ()) if m not in metrics]
     units = {m.name: m.unit(result.start.units) for m in metrics} | (objective.units(result.start) if objective else {})
     cars = (result.start, result.vehicle)
-    drive = driver(cars, metrics, objective, Run(**completed("rescore", run, RUN)))
+    drive = driver(cars, metrics, objective, completed(rescore, run, RUN))
     return rescored(drive, roads, units, result.metric)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._settings import completed
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric
 from jaxdamp.parameters import match_paths
@@ -17,7 +18,7 @@ from jaxdamp.tune.result import ToleranceEffect, TuneResult, V
 from jaxdamp.tune.scenario_ride import Risk
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.sensitivities import sensitivity
-from jaxdamp.tune.settings import RUN, Run, Settings, completed
+from jaxdamp.tune.settings import RUN, Run, Settings
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -103,7 +104,7 @@ def tolerance_effects(
     if isinstance(metric, Sequence) and not isinstance(metric, str):
         remedy = "Call it once for each metric."
         _checks.refuse("metric", "be a single one", _checks.described(metric), remedy)
-    completed("tolerance_effects", run, RUN)
+    completed(tolerance_effects, run, RUN)
     result = sensitivity(metric, vehicle, road, over=list(scatter), dampers=None, second_order=True, **run)
     ((name, value),) = result.values.items()
     assert result.hessian is not None

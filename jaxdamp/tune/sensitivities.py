@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._jacobian import with_jacobian
+from jaxdamp._settings import completed, part
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Number, Scalar, ScalarLike, Vector
 from jaxdamp.dampers import AbstractMemoryless
@@ -36,7 +37,7 @@ from jaxdamp.tune.measuring import Measurement
 from jaxdamp.tune.objective import Function, Objective, objective_of
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.sensitivity_result import CurveSensitivity, Sensitivity
-from jaxdamp.tune.settings import RUN, Asked, Free, Run, completed
+from jaxdamp.tune.settings import RUN, Free, Run
 from jaxdamp.tune.shape import damper_paths, held_force
 from jaxdamp.tune.task import is_white
 from jaxdamp.vehicles import AbstractVehicle, ChannelKind
@@ -106,11 +107,11 @@ def sensitivity(
     >>> {name: round(float(value), 3) for name, value in result.elasticities("rms_sprung_acceleration").items()}
     {'sprung_mass': -0.648, 'damper.rate': -0.276}
     """
-    asked = completed("sensitivity", settings, DEFAULTS)
+    asked = completed(sensitivity, settings, DEFAULTS)
     wanted = list(metric) if isinstance(metric, Sequence) and not isinstance(metric, str) else [metric]
     given = dict(quantities or {})
     _check(wanted, vehicle, road, given)
-    first, run = (road if isinstance(road, GIVEN) else road(**given)), Run(**{name: asked[name] for name in RUN})
+    first, run = (road if isinstance(road, GIVEN) else road(**given)), part(asked, RUN)
     objective = _objective(wanted, vehicle, white=is_white(first))
     hatted, paths = _with_curves(vehicle, first, asked, run)
     of_vehicle, free = _free(vehicle, hatted, asked["over"], asked["freeze"])
@@ -143,7 +144,7 @@ def _objective(wanted: Sequence[str | Metric | Function], vehicle: AbstractVehic
 
 
 def _with_curves(
-    vehicle: AbstractVehicle, road: Road | Scenarios, asked: Asked, run: Run
+    vehicle: AbstractVehicle, road: Road | Scenarios, asked: SensitivitySettings, run: Run
 ) -> tuple[AbstractVehicle, list[str]]:
     """The vehicle with hats beside the laws whose curves are looked at, and the paths of these laws."""
     reach, hats = asked["reach"], asked["hats"]
@@ -204,7 +205,7 @@ def _reach(vehicle: AbstractVehicle, road: Road | Scenarios, run: Run) -> float:
 
 
 def _free(
-    vehicle: AbstractVehicle, hatted: AbstractVehicle, over: Sequence[str], freeze: Sequence[str]
+    vehicle: AbstractVehicle, hatted: AbstractVehicle, over: object, freeze: Sequence[str]
 ) -> tuple[FreeParameters, FreeParameters]:
     """The parameters of the vehicle, and the same of the vehicle with hats, with the forces of the hats."""
     of_vehicle = free_parameters(vehicle, over=name_patterns("over", over), freeze=freeze)

@@ -1,11 +1,10 @@
 """The settings of tunings: what may change and within which limits, how it is driven, how it is searched."""
 
-import difflib
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeAlias, TypedDict
+from typing import TypedDict
 
 from jaxdamp.metrics import Metric
-from jaxdamp.simulation import AbstractEngine
+from jaxdamp.simulation import RUN, Run
 from jaxdamp.tune.limits import Limits
 from jaxdamp.tune.ranges import Bound
 from jaxdamp.tune.shape import Shape
@@ -54,20 +53,6 @@ class Design(Free, total=False):
     metrics: Sequence[str | Metric]
 
 
-class Run(TypedDict, total=False):
-    """How a vehicle is driven, as in `simulate`: keywords of everything in `tune` that drives.
-
-    Arguments:
-        duration: length of the run [s].
-        dt: spacing of the instants [s]; 1 ms, or that of the engine, if left out.
-        engine: of the simulation, as in `simulate`; one that passes derivatives by parameters.
-    """
-
-    duration: float | None
-    dt: float | None
-    engine: AbstractEngine | None
-
-
 class Search(TypedDict, total=False):
     """How a tuning searches, and how its result is judged.
 
@@ -89,20 +74,8 @@ class Settings(Design, Run, Search, total=False):
     """All keywords that `minimise`, `pareto` and `robust` have in common: those of `Design`, `Run` and `Search`."""
 
 
-RUN = Run(duration=None, dt=None, engine=None)
-Asked: TypeAlias = dict[str, Any]  # completed settings, each of its own type
 DEFAULTS: Settings = {
     "over": None, "freeze": (), "bounds": None, "tie": None, "limits": None, "shape": (), "metrics": (), **RUN,
     "starts": 1, "seed": 0, "max_steps": 100, "fresh_roads": 32,
 }  # fmt: skip
 LEAST = {"points": 1, "between": 0, "starts": 1, "seed": 0, "max_steps": 1, "fresh_roads": 0}  # of the counts
-
-
-def completed(call: str, given: Mapping[str, object], defaults: Mapping[str, object]) -> Asked:
-    """Settings with the defaults of a call."""
-    for name in given:
-        if name not in defaults:
-            near = difflib.get_close_matches(name, defaults, 1)
-            hint = f"did you mean {near[0]!r}?" if near else f"it has {', '.join(defaults)}."
-            raise TypeError(f"{call} has no argument {name!r}: {hint}")
-    return {**defaults, **given}

@@ -10,6 +10,7 @@ from jaxtyping import Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._pieces import piece
+from jaxdamp._settings import part
 from jaxdamp.dampers import has_fitted_range
 from jaxdamp.metrics import Metric, current_name
 from jaxdamp.roads import AbstractRoad, WhiteRoad
@@ -29,7 +30,7 @@ from jaxdamp.tune.objective import Function, Targets, goal_limits, goal_objectiv
 from jaxdamp.tune.ranges import search_range
 from jaxdamp.tune.result import V
 from jaxdamp.tune.scenarios import Road, Scenarios
-from jaxdamp.tune.settings import LEAST, RUN, Asked, Run
+from jaxdamp.tune.settings import LEAST, RUN, Run, Settings
 from jaxdamp.tune.shape import ShapeNumbers
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -122,10 +123,10 @@ class DesignTask(Generic[V]):
         road: Road | Scenarios,
         *,
         argument: str,
-        settings: Asked,
+        settings: Settings,
     ) -> None:
         self.vehicle, self.road, self._argument = vehicle, road, argument
-        self.run = Run(**{name: settings[name] for name in RUN})
+        self.run = part(settings, RUN)
         metrics, white = settings["metrics"], is_white(road)
         further = [m.name for m in metrics if isinstance(m, Metric)]
         metric_names = [*(m.name for m in vehicle.ride_metrics), *further]
@@ -140,7 +141,7 @@ class DesignTask(Generic[V]):
         more = [*metrics, *limited, *of_targets]
         self.objective = objective_of(objectives, vehicle, more, list(self.allowed), white=white, argument=argument)
         _refuse_negative(self.allowed, self.objective.metrics)
-        self.space = search_range(vehicle, *(settings[name] for name in ("over", "freeze", "bounds", "tie")))
+        self.space = search_range(vehicle, settings["over"], settings["freeze"], settings["bounds"], settings["tie"])
         self.tolerance = DOUBLE if self.space.free.values.dtype == np.float64 else SINGLE
         self.measured = Measurement(
             vehicle, road, self.objective, self.space.free,

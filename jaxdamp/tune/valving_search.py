@@ -14,6 +14,7 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._jacobian import with_jacobian
 from jaxdamp._progress import Progress
+from jaxdamp._settings import completed
 from jaxdamp._status import Status
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._triangles import triangle
@@ -24,7 +25,7 @@ from jaxdamp.parameters import FreeParameters
 from jaxdamp.rig import march, quasi_static, respond
 from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, least_squares_on_host
 from jaxdamp.tune.ranges import INSIDE, Bound, SearchRange, search_range
-from jaxdamp.tune.settings import Free, completed
+from jaxdamp.tune.settings import Free
 from jaxdamp.tune.valving_result import OutOfReach, ValveParameter, ValvingResult
 
 
@@ -46,7 +47,7 @@ class ValvingSettings(Free, total=False):
     max_steps: int
 
 
-DEFAULTS = {"over": None, "freeze": (), "bounds": None, "starts": 8, "max_steps": 200}
+DEFAULTS: ValvingSettings = {"over": None, "freeze": (), "bounds": None, "starts": 8, "max_steps": 200}
 Target: TypeAlias = AbstractDamper | BenchRun | Sequence[BenchRun] | tuple[VectorLike, VectorLike]
 ForceOf = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]  # of values: all forces, and their derivatives
 
@@ -133,7 +134,7 @@ def valving(
     (True, True)
     """
     check_module("start", start, (MonoTube, TwinTube), "valving(target, start)")
-    asked = completed("valving", settings, DEFAULTS)
+    asked = completed(valving, settings, DEFAULTS)
     valves = ["piston.*", *["base.*"] * isinstance(start, TwinTube)]
     over = [*valves, "gas.pressure"] if asked["over"] is None else asked["over"]
     _checks.positive("tolerance", tolerance)

@@ -37,8 +37,9 @@ def clicks() -> dict[str, list[BenchRun]]:
     [
         (Bilinear, {"rig": "gas"}),
         (Lag(Bilinear(1500.0, 1500.0), 2e-3), {"rig": "gas", "bounds": {"lag_time": (1e-4, 1e-2)}}),
+        (Bilinear(2400.0, 1200.0), {"rig": "gas", "over": ["rebound_rate"]}),
     ],
-    ids=["memoryless", "with a state"],
+    ids=["memoryless", "with a state", "one of its numbers"],
 )
 @pytest.mark.exhaustive_cases("memoryless")
 def test_the_optimum_is_that_of_single_fits(clicks, start, options):
