@@ -68,9 +68,9 @@ class _Searcher:
     """Searches from several starts: whole ones on all samples, first looks on the first part of long records."""
 
     def __init__(self, problem: Problem, solver: Solver | None, starts: int | None) -> None:
-        self.problem, self.solver, self._part = problem, solver, None
-        plain = solver is None or isinstance(solver, BoundedLevenbergMarquardt)
-        self._whole = Searches(problem) if plain else None
+        own = isinstance(solver, BoundedLevenbergMarquardt)
+        self.problem, self._bounded, self._other = problem, solver if own else None, None if own else solver
+        self._whole, self._part = Searches(problem) if self._other is None else None, None
         if starts != 1 and self._whole and self._whole.is_printed and (part := first_part(problem)):
             self._part = self._whole.of(part, evaluator(part.free, part.residuals))
 
@@ -88,8 +88,8 @@ class _Searcher:
     def end(self, values: Float[np.ndarray, " free"], steps: int) -> SearchEnd:
         """The end of a search on all samples."""
         if self._whole is None:
-            return search(self.problem.started_at(values), steps, solver=self.solver)
-        return self._whole.end(values, steps, solver=self.solver)
+            return search(self.problem.started_at(values), steps, solver=self._other)
+        return self._whole.end(values, steps, solver=self._bounded)
 
     def to_its_end(self, end: SearchEnd, max_steps: int) -> SearchEnd:
         """The end of a search on all samples that went fewer steps than it may take."""

@@ -27,8 +27,8 @@ def growing(run):
 
 def test_the_first_part_has_the_whole_motion_in_fewer_samples(runs):
     problem = prepare(NEAR, runs, rig="offset")
-    part = first_part.first_part(problem)
-    values = np.asarray(problem.free.values)
+    part, values = first_part.first_part(problem), problem.free.values
+    assert part is not None
     whole, seen = np.asarray(problem.residual(values)), np.asarray(part.residual(values))
     for place, run in zip(problem.places, problem.runs, strict=True):
         kept = np.flatnonzero(seen[place])
@@ -53,7 +53,7 @@ def counted(monkeypatch):
 
     def end(self, values, max_steps, **how):
         found = plain(self, values, max_steps, **how)
-        searches.append((np.count_nonzero(self.problem.used), found.steps))
+        searches.append((int(np.count_nonzero(self.problem.used)), found.steps))
         return found
 
     monkeypatch.setattr(several.Searches, "end", end)

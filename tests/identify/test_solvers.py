@@ -75,7 +75,7 @@ def test_steps_tolerances_and_wrong_solvers(sines, unchecked):
     exact = identify.fit(AWAY, runs, solver=BoundedLevenbergMarquardt(tolerance=1e-6), starts=1)
     assert loose.steps < exact.steps and apart(exact, loose) < 0.3
     with pytest.raises(ValueError, match="Argument `solver` must be a least-squares solver or minimiser of optimistix"):
-        identify.fit(AWAY, runs, solver=optx.Newton(**HOW))
+        identify.fit(AWAY, runs, solver=optx.Newton(**HOW))  # type: ignore[call-overload]
 
 
 def test_a_linear_law_by_a_given_solver_is_that_of_the_closed_form(sines):
