@@ -95,7 +95,8 @@ def read(
     asked: list[str | os.PathLike[str]] = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
     given: Contents = {"sign": sign, "force_sign": force_sign, "command": command, "settings": settings}
     given |= completed(read, files, BENCH_FILES)
-    readers, note = given.pop("readers"), ()
+    own, note = given.pop("readers"), ()
+    readers = with_own(own)
     file = find_manifest(manifest, asked)
     if file is not None:
         stated = read_manifest(file, BENCH_KEYS)
@@ -107,10 +108,8 @@ def read(
     tables = ({**(given[name] or {})} for name in ("columns", "units", "gains"))
     choice = Choice(*tables, stroke_from_velocity=bool(given["stroke_from_velocity"]))
     how = Interpretation(choice, given["sign"], given["force_sign"], given["sampling_rate"], drop_bad_rows)
-    found = find_files(asked, {*FOLDER_SUFFIXES, *(readers or {})})
-    runs, errors = _read_files(
-        found, with_own(readers), given["delimiter"], lambda tables, name: _bench_runs(tables, name, how)
-    )
+    found = find_files(asked, {*FOLDER_SUFFIXES, *(own or {})})
+    runs, errors = _read_files(found, readers, given["delimiter"], lambda tables, name: _bench_runs(tables, name, how))
     if errors and not (skip_bad and runs):
         ways, count = Setting("skip_bad", True), len(found) - len(errors)
         others = "The other file" if count == 1 else f"The other {count} files"
@@ -165,17 +164,18 @@ def read_rides(
     asked: list[str | os.PathLike[str]] = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
     given: Contents = {"columns": columns, "road": road, "reversed_channels": reversed_channels}
     given |= completed(read_rides, files, FILES) | {"sampling_rate": sampling_rate}
-    readers = given.pop("readers")
+    own = given.pop("readers")
+    readers = with_own(own)
     file = None if manifest is None else find_manifest(manifest, asked)
     stated = {} if file is None else read_manifest(file, RIDE_KEYS)
     given = {key: stated.get(key) if value is None else value for key, value in given.items()}
     if given["sampling_rate"] is not None:
         _checks.positive("sampling_rate", given["sampling_rate"])
-    delimiter, found = given.pop("delimiter"), find_files(asked, {*FOLDER_SUFFIXES, *(readers or {})})
+    delimiter, found = given.pop("delimiter"), find_files(asked, {*FOLDER_SUFFIXES, *(own or {})})
     how = RideInterpretation(**given)
     records, errors = _read_files(
         found,
-        with_own(readers),
+        readers,
         delimiter,
         lambda tables, name: [ride_record(table, base, how) for table, base in _named(tables, name)],
     )

@@ -5,6 +5,7 @@ import functools
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar, final
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -214,14 +215,19 @@ def effects_of(model: Model) -> tuple[str, ...]:
 def count_states(model: Model) -> int:
     """How many states the law has; nothing is compiled for that."""
     leaves, structure = jax.tree.flatten(law_of(model))
-    return _count_states(structure, *map(jax.typeof, leaves))
+    return _count_states(structure, *(_type(leaf) if eqx.is_array_like(leaf) else leaf for leaf in leaves))
+
+
+def _type(number: object) -> jax.ShapeDtypeStruct:
+    known = jax.typeof(number)
+    return jax.ShapeDtypeStruct(known.shape, known.dtype)
 
 
 @functools.lru_cache(maxsize=256)
-def _count_states(structure: jax.tree_util.PyTreeDef, *types: Any) -> int:
+def _count_states(structure: jax.tree_util.PyTreeDef, *leaves: Any) -> int:
     """It is asked ten times in a fit, of laws that differ in their numbers alone."""
-    law: AbstractDamper = structure.unflatten(types)
-    return int(jax.eval_shape(lambda law: law.initial_state(), law).size)
+    law: AbstractDamper = structure.unflatten(leaves)
+    return int(eqx.filter_eval_shape(lambda law: law.initial_state(), law).size)
 
 
 def is_memoryless(model: Model) -> bool:
