@@ -9,7 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, PyTree, PyTreeDef
+from jaxtyping import Array, Bool, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._types import Scalar, State, Vector
@@ -224,7 +224,7 @@ def _type(number: object) -> jax.ShapeDtypeStruct:
 
 
 @functools.lru_cache(maxsize=256)
-def _count_states(structure: PyTreeDef, *leaves: Any) -> int:
+def _count_states(structure: Any, *leaves: object) -> int:
     """It is asked ten times in a fit, of laws that differ in their numbers alone."""
     law: AbstractDamper = structure.unflatten(leaves)
     return int(eqx.filter_eval_shape(lambda law: law.initial_state(), law).size)
