@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from importlib import import_module
 from pkgutil import iter_modules
 
+import numpy as np
 import pytest
 
 import jaxdamp
@@ -31,7 +32,7 @@ WRONG: dict[str, Callable[[], object]] = {  # calls with a mistyped keyword, by 
     "strokes": lambda: identify.design_experiment(LAW, force_noise=1.0, stroke=3),  # pyright: ignore[reportCallIssue]
     "sensors": lambda: identify.virtual_ride(CAR, roads.sine(0.01, frequency=1.0), {}, sensor=None),  # pyright: ignore
     "duration": lambda: simulate(CAR, roads.sine(0.01, frequency=1.0), durations=1.0),  # pyright: ignore
-    "substeps": lambda: rig.respond(LAW, [0.0, 1.0], [0.0, 1.0], substep=2),  # pyright: ignore
+    "substeps": lambda: rig.respond(LAW, np.arange(2.0), np.arange(2.0), substep=2),  # pyright: ignore
     "devices": lambda: sweep(dict, {}, device=1),  # pyright: ignore
     "columns": lambda: bench.read("nothing.csv", colums={}),  # pyright: ignore[reportCallIssue]
     "units": lambda: bench.read_rides("nothing.csv", unit={}),  # pyright: ignore[reportCallIssue]
