@@ -61,7 +61,7 @@ def profile(
     wide, open_ended, left = errors.copy(), np.zeros(errors.shape, bool), MOST_STEPS
     most = found.squares + CHI_SQUARE * variance  # the largest sum of squares of a parameter that still fits
     level = float(np.sqrt(variance * found.residual.size / most))  # of a sample's noise, to which tolerances relate
-    solver = BoundedLevenbergMarquardt(tolerance=LOOSE * level, patience=PATIENCE, goal=most / problem.level**2)
+    solver = BoundedLevenbergMarquardt(tolerance=LOOSE * level, patience=PATIENCE)
     searches = Searches(problem)
     sides = [(int(i), side) for i in np.flatnonzero(chosen & (errors > 0)) for side in (-1.0, 1.0)]
     for i, side in sides:

@@ -38,7 +38,6 @@ SLACK = 1e-9  # beyond a limit, that is a rounding error: a limit of one coordin
 WORTH = 0.1  # standard errors: a decrease that counts, where the damping begins anew
 LEAST_SCALE = 1e-2  # of that before, where the damping begins anew: what the data hardly show would run away
 PATIENCE = 30  # points tried without one
-OF_THE_GOAL = 0.2  # of what is missing to the goal: a decrease that counts
 KINK = 0.01  # standard errors: a refused step that is predicted to gain less will only become shorter
 TOGETHER = 5  # solutions of one step, after which one limit at a time is exchanged, which ends
 MOST_SOLUTIONS = 30  # after which no coordinate leaves its limit any more
@@ -102,7 +101,6 @@ class Rules(NamedTuple):
     rtol: float
     atol: float
     patience: int | None
-    goal: float
 
 
 def _library(array: AnyArray) -> ModuleType:
@@ -173,9 +171,7 @@ def with_proposal(
 ) -> State:
     """The state with the next point to be tried."""
     rounding = ROUNDING * rules.precision
-    now = _half_squares(state.triangle)
-    floor = xp.maximum(rounding, rules.tolerance**2 / samples) * now + rounding**2
-    floor = xp.maximum(floor, OF_THE_GOAL * (now - 0.5 * rules.goal))
+    floor = xp.maximum(rounding, rules.tolerance**2 / samples) * _half_squares(state.triangle) + rounding**2
     limits = (rules.lower - y, rules.upper - y)
     lower, upper = (xp.where(xp.abs(a) > NEAR, MOST_OF_THE_WAY * a, a) for a in limits)
 

@@ -71,8 +71,6 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         patience: points tried in a row without a decrease worth a step of `tolerance`, after which a search ends too,
             as it does if the whole step gains nothing, or no step promises such a decrease, which is then not tried;
             None for no such ends.
-        goal: sum of squares that is to be reached: a decrease of less than a fifth of what is missing to it ends the
-            search too.
         norm: the largest of all unknowns decides whether a step is short.
 
     >>> time = jnp.linspace(0.0, 2.0, 50)
@@ -92,7 +90,6 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
     rtol: float = 1e-6
     atol: float = 1e-9
     patience: int | None = None
-    goal: float = np.inf
     norm: Callable[[PyTree], Array] = optx.max_norm
 
     def init(
@@ -226,7 +223,7 @@ def rules_of(solver: BoundedLevenbergMarquardt, xp: ModuleType, like: PyTree) ->
         )
         lower, upper = (jnp.broadcast_to(side.astype(dtype), flat.shape) for side in sides)
     precision = solver.precision or float(jnp.finfo(dtype).eps)
-    return Rules(lower, upper, solver.tolerance, precision, solver.rtol, solver.atol, solver.patience, solver.goal)
+    return Rules(lower, upper, solver.tolerance, precision, solver.rtol, solver.atol, solver.patience)
 
 
 def _linearised(
