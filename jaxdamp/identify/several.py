@@ -168,7 +168,9 @@ def _follow(searcher: _Searcher, others: Sequence[np.ndarray], best: SearchEnd, 
     """The ends of a few steps from each of several starts, and of the whole search from the most promising."""
     if not others:
         return []
-    here, *looks = (searcher.look(values, min(FIRST_LOOK, max_steps)) for values in (best.values, *others))
+    steps = min(FIRST_LOOK, max_steps)
+    here = searcher.look(best.values, steps) if searcher.takes_part else best
+    looks = [searcher.look(values, steps) for values in others]
     most = PROMISING * min([end.squares for end in (here, *looks) if end.finite], default=np.inf)
     open_ended = (end for end in looks if not end.converged and end.finite and end.squares < most)
     promising = sorted(open_ended, key=lambda end: end.squares)
