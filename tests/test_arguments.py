@@ -4,6 +4,7 @@ import inspect
 from collections.abc import Callable, Iterator
 from importlib import import_module
 from pkgutil import iter_modules
+from typing import Unpack, get_args, get_origin
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 import jaxdamp
 from jaxdamp import bench, identify, report, rig, roads, simulate, sweep, tune, vehicles
 from jaxdamp._guesses import shared_names
-from jaxdamp.dampers import Bilinear
+from jaxdamp.dampers import Bilinear, Linear
 
 
 MOST = 8
@@ -24,6 +25,8 @@ WRONG: dict[str, Callable[[], object]] = {  # calls with a mistyped keyword, by 
     "shared": lambda: identify.fit(LAW, {"A": []}, shard=["friction"]),  # pyright: ignore[reportCallIssue]
     "loss": lambda: identify.fit_many(LAW, {"A": []}, los="huber"),  # pyright: ignore[reportCallIssue]
     "settling": lambda: identify.fit(CAR, [], setling=0.5),  # pyright: ignore[reportCallIssue]
+    "held_out": lambda: identify.compare({"linear": Linear}, [], heldout=[]),  # pyright: ignore[reportCallIssue]
+    "scatter": lambda: tune.robust("comfort", CAR, tune.Scenarios([roads.iso8608("C", 20.0, seed=1)]), scater={}),  # pyright: ignore[reportCallIssue]
     "per_record": lambda: identify.fit_vehicle(CAR, [], per_records=["offset"]),  # pyright: ignore[reportCallIssue]
     "bounds": lambda: identify.fit_targets(len, LAW, {}, bound={}),  # pyright: ignore
     "common": lambda: identify.fit_scheduled(LAW, [], comon=["friction"]),  # pyright: ignore[reportCallIssue]
@@ -41,19 +44,44 @@ WRONG: dict[str, Callable[[], object]] = {  # calls with a mistyped keyword, by 
 }
 
 
-def functions() -> Iterator[tuple[str, list[inspect.Parameter]]]:
-    """The public functions with their parameters."""
+def functions() -> Iterator[tuple[str, Callable[..., object]]]:
+    """The public functions by their names."""
     for package in PACKAGES:
         module = import_module(f"jaxdamp.{package}")
         for name in [*module.__all__, *shared_names(module)]:
             function = getattr(module, name)
             if inspect.isfunction(function) and function.__module__.startswith("jaxdamp"):
-                yield f"{package}.{name}", list(inspect.signature(function).parameters.values())
+                yield f"{package}.{name}", function
+
+
+def written(function: Callable[..., object]) -> list[inspect.Parameter]:
+    """The parameters of a function as its definition has them."""
+    return list(inspect.signature(inspect.unwrap(function)).parameters.values())
 
 
 def test_no_function_takes_more_than_eight_arguments_beside_typed_keywords() -> None:
-    counts = {name: sum(p.kind is not p.VAR_KEYWORD for p in given) for name, given in functions()}
+    counts = {name: sum(p.kind is not p.VAR_KEYWORD for p in written(function)) for name, function in functions()}
     assert {name: count for name, count in counts.items() if count > MOST} == MORE
+
+
+TYPED = {n: f for n, f in functions() if any(get_origin(p.annotation) is Unpack for p in written(f))}
+
+
+@pytest.mark.parametrize("name", TYPED)
+def test_help_and_completion_know_every_keyword_with_its_default(name: str) -> None:
+    *own, settings = written(TYPED[name])
+    kinds = get_args(settings.annotation)[0].__annotations__
+    shown = inspect.signature(TYPED[name]).parameters
+    assert set(shown) <= {*kinds, *(p.name for p in own)} and len(shown) > len(own)
+    assert all(shown[p.name] == p for p in own)
+    added = [p for p in shown.values() if p not in own]
+    assert all(p.kind is p.KEYWORD_ONLY and p.default is not p.empty and p.annotation is not p.empty for p in added)
+
+
+def test_the_keywords_of_a_fit_stand_in_its_signature() -> None:
+    shown = inspect.signature(identify.fit).parameters
+    assert list(shown)[:4] == ["law", "runs", "rig", "over"] and shown["max_steps"].default == 200
+    assert inspect.signature(tune.pareto).parameters["fresh_roads"].default == 3  # its own, 32 of `minimise`
 
 
 @pytest.mark.parametrize("meant", WRONG)

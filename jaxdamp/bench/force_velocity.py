@@ -9,7 +9,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._files import FOLDER_SUFFIXES, find_files
-from jaxdamp._settings import completed
+from jaxdamp._settings import with_defaults
 from jaxdamp._tables import Column as TableColumn, Table
 from jaxdamp._types import Figure
 from jaxdamp.bench import sign as signs
@@ -148,6 +148,7 @@ def _motion(curve: Curve, table: ForceVelocityTable) -> BenchRun:
     )
 
 
+@with_defaults(FILES)
 def read_table(
     paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
     *,
@@ -198,13 +199,12 @@ def read_table(
     if side is not None:
         _checks.one_of("side", side, SIDES)
     signs.check_words(sign, None)
-    asked = completed(read_table, files, FILES)
-    how = How(Choice({**(columns or {})}, {**(asked["units"] or {})}), sign, side)
-    sheets, readers = find_files(paths, {*FOLDER_SUFFIXES, *(asked["readers"] or {})}), with_own(asked["readers"])
+    how = How(Choice({**(columns or {})}, {**(files["units"] or {})}), sign, side)
+    sheets, readers = find_files(paths, {*FOLDER_SUFFIXES, *(files["readers"] or {})}), with_own(files["readers"])
     sides, notes, problems = [], [], Problems()
     for file in sheets:
         with problems.collected():
-            tables = [with_headers(table) for table in read_tables(file, readers, asked["delimiter"])]
+            tables = [with_headers(table) for table in read_tables(file, readers, files["delimiter"])]
             fitting = [table for table in tables if is_force_velocity(table, how.choice)]
             if not fitting:
                 there = ", ".join(name for table in tables for name in table.names)

@@ -10,7 +10,7 @@ from typing import TypeVar, Unpack
 from jaxdamp import _checks
 from jaxdamp._checks import Setting
 from jaxdamp._files import FOLDER_SUFFIXES, find_files
-from jaxdamp._settings import completed
+from jaxdamp._settings import with_defaults
 from jaxdamp._tables import Contents
 from jaxdamp.bench import sign as signs
 from jaxdamp.bench.bench_tables import Interpretation, bench_runs
@@ -31,6 +31,7 @@ _Record = TypeVar("_Record")
 Command = float | int | str | Mapping[str, float | int]
 
 
+@with_defaults(BENCH_FILES)
 def read(
     paths: Paths,
     *,
@@ -94,7 +95,7 @@ def read(
     """
     asked: list[str | os.PathLike[str]] = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
     given: Contents = {"sign": sign, "force_sign": force_sign, "command": command, "settings": settings}
-    given |= completed(read, files, BENCH_FILES)
+    given |= files
     own, note = given.pop("readers"), ()
     readers = with_own(own)
     file = find_manifest(manifest, asked)
@@ -118,6 +119,7 @@ def read(
     return BenchSet(_commanded(_with_settings(runs, given["settings"]), given["command"]), tuple(map(str, errors)))
 
 
+@with_defaults(FILES)
 def read_rides(
     paths: Paths,
     *,
@@ -163,7 +165,7 @@ def read_rides(
     """
     asked: list[str | os.PathLike[str]] = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
     given: Contents = {"columns": columns, "road": road, "reversed_channels": reversed_channels}
-    given |= completed(read_rides, files, FILES) | {"sampling_rate": sampling_rate}
+    given |= files | {"sampling_rate": sampling_rate}
     own = given.pop("readers")
     readers = with_own(own)
     file = None if manifest is None else find_manifest(manifest, asked)

@@ -3,12 +3,14 @@
 import dataclasses
 import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, ClassVar, ParamSpec, Protocol, TypeAlias, cast, overload, runtime_checkable
+from typing import Any, ClassVar, ParamSpec, Protocol, TypeAlias, Unpack, cast, overload, runtime_checkable
 
+from jaxdamp import _checks
 from jaxdamp._pieces import piece
 from jaxdamp._progress import Progress
 from jaxdamp._results import plotted
 from jaxdamp._second_process import anywhere, elsewhere
+from jaxdamp._settings import part, with_defaults
 from jaxdamp._tables import Contents, Table, with_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Figure
@@ -23,6 +25,7 @@ from jaxdamp.identify.model import on_rig
 from jaxdamp.identify.reducing import reduced
 from jaxdamp.identify.rungs import Failure, Rung, ladder_table, verdict
 from jaxdamp.identify.scheduling import fit_scheduled, settings_stated
+from jaxdamp.identify.settings import COMPARISON, FIT, ComparisonSettings
 from jaxdamp.identify.starting import AbstractTrainedStart, Start, check_starts, frozen_by, started
 from jaxdamp.identify.vehicle_comparing import VehicleComparison, compare_vehicles
 from jaxdamp.parameters import name_patterns, parameters
@@ -118,6 +121,7 @@ def of_any_kind(compare: Callable[P, Comparison]) -> CompareCall[P]:
 
 @of_any_kind
 @of_known_numbers
+@with_defaults(COMPARISON)
 def compare(
     laws: Mapping[str, Start],
     runs: Iterable[BenchRun],
@@ -126,8 +130,7 @@ def compare(
     rig: Machine = OFFSET,
     scheduled: bool = False,
     progress: Callable[[str], None] | None = None,
-    bad_records: str = "refuse",
-    **options: Any,
+    **settings: Unpack[ComparisonSettings],
 ) -> Comparison:
     """Fit several laws to the same records, judge them on motion held out, and recommend one (`.best`).
 
@@ -140,7 +143,7 @@ def compare(
 
     Vehicles are compared on records of their motion in the same way: `compare(friction_ladder(car), drives)` gives a
     `VehicleComparison`. Each of two drives or more is left out in turn, one drive is divided in time; errors of all
-    channels are taken together. `options` are then those of `fit` for vehicles.
+    channels are taken together. `settings` are then those of `fit` for vehicles.
 
     Arguments:
         laws: starts by name, such as `default_ladder(runs)`; or vehicles, such as `friction_ladder(car)`.
@@ -151,8 +154,9 @@ def compare(
         scheduled: whether the parameters of each law are functions of the records' command, as in `fit_scheduled`;
             starts are carried over from neighbouring settings, and the best law is also scored between settings.
         progress: called with each name before its fit; a line in the terminal if it is left out.
-        bad_records: "refuse", "leave_out" or "keep" records with an error, as in `fit`; those held out are checked too.
-        options: passed on to `fit`. Names of parameters that only some of the laws have count for these laws.
+        settings: keywords of `fit`, all optional (see `FitSettings`), for all laws; with `scheduled`, `common` and
+            `blend` too. Names of parameters that only some of the laws have count for these laws. `bad_records`
+            concerns those held out too.
 
     Raises:
         ValueError: no laws, or none that could be fitted; a record with an error; with `scheduled`, records of one
@@ -167,7 +171,7 @@ def compare(
     """
     call = "compare(laws, runs)"
     check_starts(laws, call)
-    robust = options.get("loss", "squares") != "squares"
+    robust, bad_records = settings["loss"] != "squares", settings["bad_records"]
     runs = usable(as_runs(runs, call=call), bad_records, robust=robust)
     held_out = usable(as_runs(held_out, "held_out"), bad_records, robust=robust, argument="held_out")
     with Progress("Fitting") as shown:
@@ -178,12 +182,13 @@ def compare(
             number += 1
             shown(f"{name}, {number} of {len(laws)}" if number <= len(laws) else f"{name}, made simpler")
 
-        how = {"rig": rig, "scheduled": scheduled, "progress": progress or counted, "bad_records": bad_records}
-        comparison = Comparison.of(fit_each(laws, runs, held_out, **how, **options), held_out)
+        fits = fit_each(laws, runs, held_out, rig=rig, scheduled=scheduled, progress=progress or counted, **settings)
+        comparison = Comparison.of(fits, held_out)
     _ = comparison.verdict  # which leaves out settings if there are any: that is part of this work
     return comparison
 
 
+@with_defaults(COMPARISON)
 def fit_each(
     laws: Mapping[str, Start],
     runs: Sequence[BenchRun],
@@ -191,9 +196,8 @@ def fit_each(
     *,
     rig: Machine = OFFSET,
     scheduled: bool = False,
-    freeze: Sequence[str] = (),
     progress: Callable[[str], None] = lambda name: None,
-    **options: Any,
+    **settings: Unpack[ComparisonSettings],
 ) -> Iterator[Rung | Failure]:
     """Fit the laws of a comparison; yields each result or failure in their order, as soon as it is available.
 
@@ -207,16 +211,19 @@ def fit_each(
         held_out: records to judge on, as in `compare`.
         rig: the test machine of all fits, as in `compare`.
         scheduled: whether the parameters are functions of the command, as in `compare`.
-        freeze: parameters to hold at their start, as in `fit`.
         progress: called with each name before its result is waited for.
-        options: passed on to `fit`.
+        settings: of the fits, as in `compare`.
 
     Raises:
-        ValueError: with `scheduled`, records without a command or of one command only.
+        ValueError: with `scheduled`, records without a command or of one command only; without it, `common` or `blend`.
     """
     if scheduled:
         runs = settings_stated(runs)
-    named = {"freeze": name_patterns("freeze", freeze), **options}
+    elif settings["common"] or settings["blend"]:
+        remedy = "These keywords are about fits of several settings: give `scheduled=True`, or leave them out."
+        _checks.refuse("scheduled", "be True with `common` or `blend`", scheduled, remedy)
+    of_fits = settings if scheduled else part(settings, FIT)
+    named = {**of_fits, "freeze": name_patterns("freeze", settings["freeze"])}
     naming = any(named.get(option) for option in NAMED)
     known = {name: _paths(law, runs, rig) for name, law in laws.items()} if naming else {}
 

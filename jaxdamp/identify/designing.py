@@ -10,7 +10,7 @@ from jaxtyping import Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, drawn_by
-from jaxdamp._settings import completed
+from jaxdamp._settings import with_defaults
 from jaxdamp._tables import Column, Table
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import Excitation
@@ -160,6 +160,7 @@ def extent(test: Excitation) -> tuple[float, float]:
 
 
 @of_known_numbers
+@with_defaults(DEFAULTS)
 def design_experiment(
     law: AbstractDamper,
     limits: MachineLimits | None = None,
@@ -207,10 +208,9 @@ def design_experiment(
     >>> max(design.standard_errors.values()) < 10.0
     True
     """
-    asked = completed(design_experiment, settings, DEFAULTS)
-    tests, duration = asked["tests"], asked["duration"]
+    tests, duration = settings["tests"], settings["duration"]
     _check(limits, tests, runs, force_noise, criterion, function)
-    freeze, tie, rate = asked["freeze"], asked["tie"], asked["sampling_rate"]
+    freeze, tie, rate = settings["freeze"], settings["tie"], settings["sampling_rate"]
     informed = functools.partial(
         information, law, rig=rig, freeze=freeze, tie=tie, sampling_rate=rate, force_noise=force_noise
     )
@@ -218,12 +218,12 @@ def design_experiment(
         candidates: dict[Any, Excitation] = dict(enumerate(tests))
     else:
         assert limits is not None
-        candidates = dict(grid(limits, asked["waveforms"], duration, asked["strokes"], asked["frequencies"]))
+        candidates = dict(grid(limits, settings["waveforms"], duration, settings["strokes"], settings["frequencies"]))
     if not candidates:
         _checks.refuse("limits", "leave tests to choose from", "no candidate", "Allow more, or give `tests`.")
     pool = _Pool.of(candidates, informed(list(candidates.values())), limits)
     free = pool.free
-    goal = Goal.of(free, criterion, function, asked["prior"])
+    goal = Goal.of(free, criterion, function, settings["prior"])
     chosen = goal.exchanged(goal.added([], runs, pool.matrices), pool.matrices)
     for ratio in FINER if tests is None else ():
         assert limits is not None

@@ -12,7 +12,7 @@ from jaxtyping import PyTree
 
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
-from jaxdamp._settings import completed, part
+from jaxdamp._settings import part, with_defaults
 from jaxdamp._status import Status
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._triangles import triangle
@@ -108,6 +108,7 @@ def of_any_records(
 
 @of_any_records(fit_vehicle, fit_many)
 @of_known_numbers
+@with_defaults(FIT)
 def fit(
     law: Start, runs: BenchRun | Iterable[BenchRun], *, rig: Machine = None, **settings: Unpack[FitSettings]
 ) -> FitResult:
@@ -168,18 +169,17 @@ def fit(
     >>> abs(result["rebound_rate"].value - 2600.0) < 4 * result["rebound_rate"].standard_error
     True
     """
-    asked = completed(fit, settings, FIT)
-    loss, force_noise, starts = asked["loss"], asked["force_noise"], asked["starts"]
+    loss, force_noise, starts = settings["loss"], settings["force_noise"], settings["starts"]
     _checks.one_of("loss", loss, LOSSES)
     if force_noise is not None:
         _checks.positive("force_noise", force_noise)
-    runs = usable(as_runs(runs, call="fit(law, runs)"), asked["bad_records"], robust=loss != "squares")
-    problem = prepare(law, runs, rig=rig, **part(asked, PROBLEM))
-    if asked["bad_records"] != "keep" and not asked["per_record"] and asked["initial_state"] != "estimated":
+    runs = usable(as_runs(runs, call="fit(law, runs)"), settings["bad_records"], robust=loss != "squares")
+    problem = prepare(law, runs, rig=rig, **part(settings, PROBLEM))
+    if settings["bad_records"] != "keep" and not settings["per_record"] and settings["initial_state"] != "estimated":
         refuse_contradicting(contradicting(problem.free.tree, problem.fitted_to))
 
     def by_squares(problem: Problem, starts: int | None) -> Solution:
-        return solve(problem, starts=starts, max_steps=asked["max_steps"], solver=asked["solver"])
+        return solve(problem, starts=starts, max_steps=settings["max_steps"], solver=settings["solver"])
 
     noise = functools.partial(noise_of, force_noise=force_noise)
     problem, solution = solve_by(problem, by_squares, loss=loss, noise=noise, starts=starts)
@@ -188,17 +188,17 @@ def fit(
         problem, solution = with_static_force_on_machine(problem, solution)
     named = matched_in_words(
         [p.path for p in parameters(problem.free.tree)],
-        **{name: asked[name] for name in ("over", "freeze", "bounds", "per_record")},
+        **{name: settings[name] for name in ("over", "freeze", "bounds", "per_record")},
     )
     result = dataclasses.replace(judge(problem, solution, force_noise=force_noise), patterns=named)
     if on_machine:
         said = static_force_in_words(result, problem.runs)
         result = dataclasses.replace(result, warnings=(*result.warnings, *said))
-    words = (criterion_in_words(problem, loss, asked["priors"] or {}), records_in_words(problem))
+    words = (criterion_in_words(problem, loss, settings["priors"] or {}), records_in_words(problem))
     criterion = "; ".join(filter(None, words))
-    if asked["input_noise"] is None:
+    if settings["input_noise"] is None:
         return dataclasses.replace(result, criterion=criterion)
-    biases = map(float, input_noise_bias(problem, solution.best, asked["input_noise"]))
+    biases = map(float, input_noise_bias(problem, solution.best, settings["input_noise"]))
     estimates = tuple(e._replace(bias=bias) for e, bias in zip(result.parameters, biases, strict=True))
     biased = on_bias(estimates)
     return dataclasses.replace(

@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
-from jaxdamp._settings import completed
+from jaxdamp._settings import with_defaults
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun
 from jaxdamp.blocks import Cluster
@@ -47,6 +47,7 @@ STARTED_FROM = 12  # dampers whose records give the start of a law class
 
 @of_known_numbers
 @one_thread()
+@with_defaults(MANY)
 def fit_many(
     law: Start,
     dampers: Mapping[str, BenchRun | Iterable[BenchRun]] | Iterable[BenchRun | Iterable[BenchRun]],
@@ -103,7 +104,7 @@ def fit_many(
     >>> round(float(many.law_at(1.5).rebound_rate), -1)
     2150.0
     """
-    how: Options = {"rig": rig, **completed(fit_many, options, MANY)}
+    how: Options = {"rig": rig, **options}
     _checks.one_of("weighting", how["weighting"], ["samples", "runs"])
     _checks.one_of("loss", how["loss"], LOSSES)
     _checks.one_of("initial_state", how["initial_state"], INITIAL_STATES)

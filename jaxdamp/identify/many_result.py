@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import jax.numpy as jnp
 import numpy as np
@@ -20,6 +20,7 @@ from jaxdamp.identify.estimates import rounded
 from jaxdamp.identify.estimating import WEAK
 from jaxdamp.identify.initial_states import DRIFT
 from jaxdamp.identify.model import Model, covered_range, joined_range, law_of, rig_of, with_range
+from jaxdamp.identify.settings import FitSettings
 from jaxdamp.parameters import Coordinates, FreeParameters
 from jaxdamp.rig import Rig
 
@@ -114,7 +115,7 @@ class ManyFits(AbstractResult):
         _checks.one_of("name", name, self.names)
         return law_of(self._model(self.names.index(name)))
 
-    def fit(self, name: str, **options: Any) -> "FitResult":
+    def fit(self, name: str, **options: Unpack[FitSettings]) -> "FitResult":
         """The fit of one damper with everything that `identify.fit` gives: several minima, profiles, bias, states.
 
         It starts at the law of this damper, with the options of `fit_many`; parameters that are shared are not held.
@@ -126,8 +127,8 @@ class ManyFits(AbstractResult):
         from jaxdamp.identify.fitting import fit  # which hands many dampers to `fit_many`
 
         _checks.one_of("name", name, self.names)
-        options = {**self.options, "starts": None, **options}
-        return fit(self[name], self.records[self.names.index(name)], **options)
+        given = {**self.options, "starts": None, **options}
+        return fit(self[name], self.records[self.names.index(name)], **given)
 
     def law_at(self, setting: float, blend: str | None = None) -> AbstractDamper:
         """The law at a setting between those of the dampers.

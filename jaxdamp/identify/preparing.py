@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
-from jaxdamp._settings import completed
+from jaxdamp._settings import with_defaults
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper, Reach
@@ -43,6 +43,7 @@ FIT_OUTSIDE = "Call it outside `jax.jit`, `jax.grad` and `jax.vmap`; the residua
 
 
 @of_known_numbers
+@with_defaults(PROBLEM)
 def prepare(
     law: Start, runs: BenchRun | Iterable[BenchRun], *, rig: Machine = None, **settings: Unpack[ProblemSettings]
 ) -> Problem:
@@ -68,14 +69,13 @@ def prepare(
     >>> round(float(judge(problem, solve(problem)).law.rate), 3)
     1500.0
     """
-    asked = completed(prepare, settings, PROBLEM)
-    _checks.one_of("initial_state", asked["initial_state"], INITIAL_STATES)
+    _checks.one_of("initial_state", settings["initial_state"], INITIAL_STATES)
     _checks.untraced("law", law, FIT_OUTSIDE)
     runs = _records(runs)
-    weighting = asked["weighting"]
+    weighting = settings["weighting"]
     sigma = weights(weighting, runs)
-    begin = begun(law, runs, sigma, rig, asked)
-    return begin.problems([runs], [sigma], asked["samples_per_cycle"], each=weighting == "runs")[0]
+    begin = begun(law, runs, sigma, rig, settings)
+    return begin.problems([runs], [sigma], settings["samples_per_cycle"], each=weighting == "runs")[0]
 
 
 class Beginning(NamedTuple):

@@ -12,7 +12,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
 from jaxdamp._results import AbstractResult, Derived
-from jaxdamp._settings import completed, part
+from jaxdamp._settings import part, with_defaults
 from jaxdamp._tables import Column, Contents, Table, plain
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Figure
@@ -156,6 +156,7 @@ class ScheduledFit(AbstractResult):
 
 
 @of_known_numbers
+@with_defaults(SCHEDULED)
 def fit_scheduled(
     law: Start, runs: Iterable[BenchRun], *, rig: Machine = OFFSET, **settings: Unpack[ScheduledSettings]
 ) -> ScheduledFit:
@@ -193,22 +194,21 @@ def fit_scheduled(
     >>> identify.fit_scheduled(dampers.Linear, runs).between[0].fit_percent > 95.0
     True
     """
-    asked = completed(fit_scheduled, settings, SCHEDULED)
-    blend, progress, bad_records = asked["blend"], asked["progress"], asked["bad_records"]
-    runs = usable(settings_stated(as_runs(runs, call=CALL)), bad_records, robust=asked["loss"] != "squares")
+    blend, progress, bad_records = settings["blend"], settings["progress"], settings["bad_records"]
+    runs = usable(settings_stated(as_runs(runs, call=CALL)), bad_records, robust=settings["loss"] != "squares")
     if bad_records != "keep":
         refuse_contradicting(contradictions(runs, same_command=True))
-    _checks.one_of("weighting", cast(str, asked["weighting"]), ("samples", "runs"))
+    _checks.one_of("weighting", cast(str, settings["weighting"]), ("samples", "runs"))
     if blend is not None:
         _checks.one_of("blend", blend, ("parameters", "force"))
-    if asked["initial_state"] == "estimated":
+    if settings["initial_state"] == "estimated":
         remedy = 'Estimate states in fits of one setting: `fit(law, runs, initial_state="estimated")`.'
         _checks.refuse("initial_state", "be the same at every fit of a chain of settings", "'estimated'", remedy)
-    frozen = [*name_patterns("freeze", asked["freeze"]), *frozen_by(law)]
+    frozen = [*name_patterns("freeze", settings["freeze"]), *frozen_by(law)]
     held_rig, lag = without_command_lag(rig)
     refuse_lag_of_held(lag > 0.0, runs)
-    how: FitSettings = {**part(asked, FIT), "freeze": frozen, "bad_records": "keep"}
-    chain = Chain(law, runs, asked["common"], held_rig, lag, how)
+    how: FitSettings = {**part(settings, FIT), "freeze": frozen, "bad_records": "keep"}
+    chain = Chain(law, runs, settings["common"], held_rig, lag, how)
     with Progress("Fitting by setting") as line:
         shown = progress or line
         alone = chain.alone(chain.settings, shown)

@@ -110,19 +110,27 @@ class FitSettings(ProblemSettings, Search, total=False):
     solver: Solver | None
 
 
-class ScheduledSettings(FitSettings, total=False):
-    """All keywords of `fit_scheduled`: those of `FitSettings`, and these.
-
-    `weighting` is `"samples"` or `"runs"`, and `initial_state` not `"estimated"`.
+class ComparisonSettings(FitSettings, total=False):
+    """The keywords that `compare` has from fits: those of `FitSettings`, and with `scheduled=True` these.
 
     Arguments:
         common: parameters that do not depend on the setting, by path, last part of a path or pattern.
         blend: `"parameters"` or `"force"`; chosen by the records if it is left out, and `choice` says why.
-        progress: called with what is fitted next; a line in the terminal if it is left out.
     """
 
     common: Sequence[str]
     blend: str | None
+
+
+class ScheduledSettings(ComparisonSettings, total=False):
+    """All keywords of `fit_scheduled`: those of `ComparisonSettings`, and this.
+
+    `weighting` is `"samples"` or `"runs"`, and `initial_state` not `"estimated"`.
+
+    Arguments:
+        progress: called with what is fitted next; a line in the terminal if it is left out.
+    """
+
     progress: Callable[[str], None] | None
 
 
@@ -190,7 +198,8 @@ FIT: FitSettings = {
     **PROBLEM, "loss": "squares", "max_steps": 200, "force_noise": None, "input_noise": None, "starts": None,
     "bad_records": "refuse", "solver": None,
 }  # fmt: skip
-SCHEDULED: ScheduledSettings = {**FIT, "common": (), "blend": None, "progress": None}
+COMPARISON: ComparisonSettings = {**FIT, "common": (), "blend": None}
+SCHEDULED: ScheduledSettings = {**COMPARISON, "progress": None}
 MANY: ManySettings = {
     **FREE, **RECORDS, "loss": "squares", "max_steps": 200, "weighting": "samples", "starts": 1,
     "bad_records": "refuse",

@@ -14,7 +14,7 @@ from jaxdamp import _checks
 from jaxdamp._display import plus_minus
 from jaxdamp._one_thread import one_thread
 from jaxdamp._results import drawn_by
-from jaxdamp._settings import completed
+from jaxdamp._settings import with_defaults
 from jaxdamp._tables import Column, Contents, Table, plain
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import Reach, without_fitted_ranges
@@ -133,6 +133,7 @@ class TargetResiduals(AbstractResiduals):
 
 @of_known_numbers
 @one_thread()
+@with_defaults(TARGETS)
 def fit_targets(
     numbers: Numbers,
     start: PyTree,
@@ -171,12 +172,12 @@ def fit_targets(
     >>> [(target.name, round(target.value, 4), target.met) for target in result.targets]
     [('frequency', 1.2, True), ('damping ratio', 0.3, True)]
     """
-    asked = completed(fit_targets, settings, TARGETS)
     goals = _goals(targets, tolerance)
-    loss, starts, priors, max_steps = asked["loss"], asked["starts"], asked["priors"] or {}, asked["max_steps"]
+    loss, starts, priors = settings["loss"], settings["starts"], settings["priors"] or {}
+    max_steps, solver = settings["max_steps"], settings["solver"]
     _checks.one_of("loss", loss, LOSSES)
     _checks.counts(starts=starts, max_steps=max_steps)
-    free = _free(start, asked)
+    free = _free(start, settings)
     expected = priors_on(free, priors, 1.0)
     padding = max(free.values.size + 1 - len(goals), 0)
     wanted, allowed = (jnp.asarray(np.array(column, float)) for column in zip(*goals.values(), strict=True))
@@ -186,7 +187,7 @@ def fit_targets(
     owner = np.zeros(len(goals) + padding + sum(part.size for part in expected), int)
     everywhere, parts = Reach(np.inf, np.inf), (residuals, *expected)
     problem = Problem(free, parts, level, (), (1.0,), owner, everywhere, free.tree, (), False)
-    by_squares = functools.partial(search_scattered, seed=asked["seed"], max_steps=max_steps, solver=asked["solver"])
+    by_squares = functools.partial(search_scattered, seed=settings["seed"], max_steps=max_steps, solver=solver)
     problem, solution = solve_by(problem, by_squares, loss=loss, noise=_tolerances, starts=starts, spread=1.0)
     if not solution.best.finite:
         remedy = "Start nearer to the targets, or give `bounds`."

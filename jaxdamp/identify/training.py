@@ -14,7 +14,7 @@ from jaxtyping import Array, Float, PyTree
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
 from jaxdamp._results import drawn_by
-from jaxdamp._settings import completed
+from jaxdamp._settings import with_defaults
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Contents, Table, with_unit
 from jaxdamp._traced import of_known_numbers
@@ -126,6 +126,7 @@ class Training(AbstractFitted):
 
 
 @of_known_numbers
+@with_defaults(TRAIN)
 def train(
     law: Start,
     runs: BenchRun | Iterable[BenchRun],
@@ -171,13 +172,12 @@ def train(
     >>> trained.held_out_fit_percent > 90.0
     True
     """
-    asked = completed(train, settings, TRAIN)
     runs, held_out = as_runs(runs, call="train(law, runs, held_out=...)"), as_runs(held_out, "held_out")
     _check(runs, held_out, steps, patience)
     _checks.positive("learning_rate", learning_rate)
-    problem = prepare(law, runs, rig=rig, **asked)
+    problem = prepare(law, runs, rig=rig, **settings)
     coordinates, used, start = Coordinates(problem.free, smooth="all"), problem.residuals, problem.free.tree
-    checked = batches(start, held_out, [1.0] * len(held_out), asked["samples_per_cycle"])[0]
+    checked = batches(start, held_out, [1.0] * len(held_out), settings["samples_per_cycle"])[0]
     level = float(np.sqrt(np.mean(np.concatenate([run.force for run in problem.fitted_to]) ** 2)))
     rule = _adam(learning_rate, steps) if optimiser is None else optimiser
 

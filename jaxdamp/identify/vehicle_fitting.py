@@ -13,7 +13,7 @@ from jaxtyping import Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._one_thread import one_thread
-from jaxdamp._settings import completed
+from jaxdamp._settings import with_defaults
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, priors_on, solve_by
@@ -56,6 +56,7 @@ MOST_CHECKS = 4  # of whether `simulate` accepts the vehicle at the minimum
 
 @of_known_numbers
 @one_thread()
+@with_defaults(VEHICLE)
 def fit_vehicle(
     vehicle: AbstractVehicle,
     records: RideRecord | Iterable[RideRecord],
@@ -105,12 +106,11 @@ def fit_vehicle(
 
     `docs/vehicle_fits.md` shows an example.
     """
-    asked = completed(fit_vehicle, settings, VEHICLE)
     check_module("vehicle", vehicle, (AbstractVehicle,), "fit_vehicle(vehicle, records)")
-    over, freeze, bounds, per_record = asked["over"], asked["freeze"], asked["bounds"], asked["per_record"]
-    loss, priors = asked["loss"], asked["priors"] or {}
+    over, freeze, bounds, per_record = settings["over"], settings["freeze"], settings["bounds"], settings["per_record"]
+    loss, priors = settings["loss"], settings["priors"] or {}
     rides = checked_records(vehicle, records)
-    _checks.counts(max_steps=asked["max_steps"], starts=asked["starts"])
+    _checks.counts(max_steps=settings["max_steps"], starts=settings["starts"])
     _checks.one_of("loss", loss, LOSSES)
     _checks.nonnegative("settling", settling)
     if settling > 0.5 * min(len(ride) * ride.dt for ride in rides):
@@ -121,11 +121,11 @@ def fit_vehicle(
     varied = per_record_paths(model, per_record, len(rides))
     spread = with_values(model, {path: jnp.full(len(rides), get(model, path)) for path in varied})
     named = own_names(model)
-    limits, ties = named.find_keys("bounds", bounds), named.find_keys("tie", asked["tie"])
+    limits, ties = named.find_keys("bounds", bounds), named.find_keys("tie", settings["tie"])
     free = free_parameters(spread, freeze=frozen_paths(model, over, freeze), bounds=limits, tie=ties)
     _checks.finite("vehicle", free.values)
-    expected, dt = priors_on(free, named.find_keys("priors", priors), 1.0), asked["dt"]
-    drives, per_cycle = drives_of(vehicle, rides, dt), asked["samples_per_cycle"]
+    expected, dt = priors_on(free, named.find_keys("priors", priors), 1.0), settings["dt"]
+    drives, per_cycle = drives_of(vehicle, rides, dt), settings["samples_per_cycle"]
     data = VehicleData(model, rides, drives, benches, float(settling), varied, per_cycle, dt, expected)
     data = data.with_known_noise(noise or {})
     free = in_units(free, vehicle.units)
@@ -134,11 +134,11 @@ def fit_vehicle(
     scale, at_start = free_scale(problem, first), channel_scores(problem, first.residual, rides)
     problem = problem._replace(free=without(free, scale.held))
     begin = np.asarray(problem.free.values)
-    problem, solution = _solved(data, problem, asked)
-    problem, solution, refused = _accepted(data, problem, solution, begin, {**asked, "starts": 1})
+    problem, solution = _solved(data, problem, settings)
+    problem, solution, refused = _accepted(data, problem, solution, begin, {**settings, "starts": 1})
     result = _judged(data, problem, solution, scale, at_start, refused)
     criterion = criterion_in_words(problem, loss, priors)
-    words = _patterns(model, asked)
+    words = _patterns(model, settings)
     return dataclasses.replace(result, patterns=words, criterion=criterion)
 
 

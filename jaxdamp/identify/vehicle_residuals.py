@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxdamp import _checks
-from jaxdamp._settings import completed, part
+from jaxdamp._settings import part, with_defaults
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.model import VehicleTest, on_rig
@@ -214,6 +214,7 @@ VIRTUAL_RIDE: VirtualRideSettings = {**WITHOUT_STEP, "name": "virtual ride", "fi
 
 
 @of_known_numbers
+@with_defaults(VIRTUAL_RIDE)
 def virtual_ride(
     vehicle: AbstractVehicle,
     road: AbstractRoad,
@@ -255,8 +256,7 @@ def virtual_ride(
     >>> virtual_ride(car, roads.sine(0.01, frequency=1.2), noise, duration=5.0, seed=3)
     RideRecord('virtual ride': 5.002 s at 500 Hz, 1 wheel moved by 20 mm, measured: sprung_acceleration, stroke)
     """
-    asked = completed(virtual_ride, settings, VIRTUAL_RIDE)
-    name, finer = asked["name"], asked["finer"]
+    name, finer = settings["name"], settings["finer"]
     _checks.positive("sampling_rate", sampling_rate)
     _checks.nonnegative("road_noise", road_noise)
     _checks.one_of("driven_by", driven_by, ["heights", "forces"])
@@ -266,7 +266,7 @@ def virtual_ride(
     for channel in sensors or {}:
         _checks.one_of("sensors", channel, channels)
     dt = 1.0 / (finer * sampling_rate)
-    response = simulate(vehicle, road, **{**part(asked, WITHOUT_STEP), "dt": dt})
+    response = simulate(vehicle, road, **{**part(settings, WITHOUT_STEP), "dt": dt})
     rng = np.random.default_rng([seed, zlib.crc32(name.encode())])
     shown = {}
     for channel, deviation in channels.items():

@@ -89,7 +89,8 @@ def _bars(axes: Axes, result: TuneResult) -> None:
     change = [percent_change(result.before[n], result.after[n]) or 0.0 for n in names]
     colours = [_style.COLOURS[1] if c > 0 else _style.COLOURS[2] for c in change]
     axes.barh(rows, change, 0.65, color=colours)
-    reached = {n: " (limit reached)" if n in result.active_limits else " (limited)" for n in result.limits}
+    reached = dict.fromkeys(result.limits, " (limited)") | dict.fromkeys(result.active_limits, " (limit reached)")
+    reached |= {n: " (tightened limit reached)" for n in result.active_limits if n in result.tightened}
     reached |= dict.fromkeys(result.violated, " (LIMIT VIOLATED)")
     labels = []
     for name, value in zip(names, change, strict=True):

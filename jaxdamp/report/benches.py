@@ -5,11 +5,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Unpack
 
+from jaxdamp._settings import with_defaults
 from jaxdamp._tables import Cell, Column, Compared, Table, comparison_table, percent_change
 from jaxdamp.bench import BenchRun, Evaluation, ForceVelocityTable, LimitCheck, Preflight, evaluate
 from jaxdamp.dampers import AbstractDamper, FittedRange
 from jaxdamp.identify import predict_runs
-from jaxdamp.report.page import Attempts, Page, Report
+from jaxdamp.report.page import PAGE, Attempts, Page, Report
 from jaxdamp.simulation import Response
 
 
@@ -95,6 +96,7 @@ def range_use_table(responses: Mapping[str, Response]) -> Table | None:
     return Table("Use of the dampers beside the records of their laws", tuple(columns), tuple(rows))
 
 
+@with_defaults(PAGE, title="Damper records")
 def bench_report(
     evaluation: Evaluation,
     preflight: Preflight | None = None,
@@ -121,7 +123,7 @@ def bench_report(
     >>> "Forces at stated velocities" in page.to_html()
     True
     """
-    report = Report.by(bench_report, "Damper records", page)
+    report = Report(**page)
     if isinstance(baseline, AbstractDamper):
         baseline = law_evaluation(baseline, evaluation)
     sentences = bench_verdict(evaluation, preflight, limits)

@@ -9,7 +9,7 @@ from jaxdamp import plots
 from jaxdamp._display import Display, display, shown_in
 from jaxdamp._results import AbstractResult
 from jaxdamp._second_process import elsewhere
-from jaxdamp._settings import completed, part
+from jaxdamp._settings import part, with_defaults
 from jaxdamp.bench import BenchRun, Evaluation, Preflight
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Comparison, VehicleComparison, VehicleFit
@@ -23,6 +23,7 @@ from jaxdamp.simulation import Response
 from jaxdamp.tune import TuneResult
 
 
+@with_defaults(FIT_PAGE, title="From bench records to a better damper")
 def chain_report(
     comparison: Comparison,
     rides: Mapping[str, Mapping[str, Response]],
@@ -57,8 +58,7 @@ def chain_report(
     >>> "tyre load variation, RMS" in page.to_html()
     True
     """
-    asked = completed(chain_report, page, {**FIT_PAGE, "title": "From bench records to a better damper"})
-    report, preflight, baseline = Report(**part(asked, PAGE)), asked["preflight"], asked["baseline"]
+    report, preflight, baseline = Report(**part(page, PAGE)), page["preflight"], page["baseline"]
     best, *others = fit_verdict(report, comparison, baseline)
     report.verdict(
         *([tuned.verdict.sentence] if tuned else []),
@@ -71,8 +71,8 @@ def chain_report(
             *(bench_verdict(evaluation, preflight) if evaluation else []),
         ],
     )
-    fits = FitPart(comparison, asked["runs"], sheets, evaluation, preflight, asked["remarks"], baseline)
-    report.include(fits.drawn(report.attempts, None if asked["folder"] is None else {}) if laws is None else laws())
+    fits = FitPart(comparison, page["runs"], sheets, evaluation, preflight, page["remarks"], baseline)
+    report.include(fits.drawn(report.attempts, None if page["folder"] is None else {}) if laws is None else laws())
     if sheets:
         _add_ride_sheet(report, rides, tuned)
     for number, (road, ride) in enumerate(rides.items(), 1):

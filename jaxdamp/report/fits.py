@@ -7,7 +7,7 @@ from typing import Unpack
 import numpy as np
 
 from jaxdamp import plots, rig
-from jaxdamp._settings import completed, part
+from jaxdamp._settings import part, with_defaults
 from jaxdamp._tables import Table
 from jaxdamp._words import in_words
 from jaxdamp.bench import BenchRun, Preflight
@@ -86,6 +86,7 @@ class FitPage(Page, total=False):
 FIT_PAGE: FitPage = {**PAGE, "runs": None, "remarks": (), "preflight": None, "baseline": None}
 
 
+@with_defaults(FIT_PAGE, title="Damper laws fitted to bench records")
 def fit_report(
     comparison: Comparison,
     *,
@@ -109,14 +110,13 @@ def fit_report(
     >>> "Recommended: bilinear" in page.to_html()
     True
     """
-    asked = completed(fit_report, page, {**FIT_PAGE, "title": "Damper laws fitted to bench records"})
-    report, runs, preflight = Report(**part(asked, PAGE)), asked["runs"], asked["preflight"]
-    baseline = asked["baseline"]
+    report, runs, preflight = Report(**part(page, PAGE)), page["runs"], page["preflight"]
+    baseline = page["baseline"]
     best, *others = fit_verdict(report, comparison, baseline)
     report.verdict(best, f"{preflight.summary}." if preflight else "", more=others)
     report.sheet(lambda: comparison.plot("sheet", baseline=baseline), comparison.verdict[0], "damper_sheet")
     records = (*comparison.best.result.runs, *comparison.held_out) if runs is None else tuple(runs)
-    add_records(report, records, comparison.held_out, asked["remarks"], preflight)
+    add_records(report, records, comparison.held_out, page["remarks"], preflight)
     add_fits(report, comparison, failures, baseline)
     if validation is not None:
         add_validation(report, validation)

@@ -13,7 +13,6 @@ from typing import NamedTuple, TypedDict
 
 from jaxdamp._display import display
 from jaxdamp._second_process import elsewhere
-from jaxdamp._settings import completed
 from jaxdamp._tables import Table
 from jaxdamp._types import Figure
 from jaxdamp._words import first_upper, said
@@ -100,11 +99,6 @@ class Report:
         self._sheets: list[str | _Block] = []
         self._blocks: list[str | _Block] = []
         self._sections: list[list[str | _Block]] = []
-
-    @classmethod
-    def by(cls, function: Callable[..., "Report"], title: str, page: Page) -> "Report":
-        """That of a function with this title if none is given."""
-        return cls(**completed(function, page, {**PAGE, "title": title}))
 
     def heading(self, text: str) -> None:
         """Start a section; the page begins with links to all of them. Below a sheet sections are folded."""

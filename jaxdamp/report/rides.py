@@ -7,13 +7,14 @@ import numpy as np
 
 from jaxdamp import plots
 from jaxdamp._display import display
+from jaxdamp._settings import with_defaults
 from jaxdamp._tables import Table, percent_change, typeset_unit
 from jaxdamp._words import path_words
 from jaxdamp.dampers import AbstractDamper, law_name
 from jaxdamp.metrics import comfort_reaction
 from jaxdamp.parameters import parameters
 from jaxdamp.report.benches import range_use_table
-from jaxdamp.report.page import Page, Report
+from jaxdamp.report.page import PAGE, Page, Report
 from jaxdamp.simulation import Response, comfort_table, far_outside, metrics_table
 
 
@@ -24,6 +25,7 @@ WORDS = {
 }
 
 
+@with_defaults(PAGE, title="Ride")
 def ride_report(
     responses: Response | Mapping[str, Response],
     *,
@@ -46,18 +48,17 @@ def ride_report(
     True
     """
     rides = {"ride": responses} if isinstance(responses, Response) else dict(responses)
-    title = page.get("title", "Ride")
-    report = Report.by(ride_report, title, page)
+    report = Report(**page)
     sentences = ride_verdict(rides)
     report.verdict(*sentences)
-    report.sheet(lambda: plots.ride_sheet(rides, name=title), sentences[-1], "ride_sheet")
+    report.sheet(lambda: plots.ride_sheet(rides, name=page["title"]), sentences[-1], "ride_sheet")
     report.heading("The ride")
     report.text(axles_sentence(rides))
     report.points(notes_of(rides) if remarks is None else remarks)
     for name, law in (laws or {}).items():
         covered = f" Fitted to: {law.fitted_to.words()}." if law.fitted_to is not None else ""
         report.text(f"{name}: {_numbers(law)}.{covered}")
-    add_rides(report, rides, title)
+    add_rides(report, rides, page["title"])
     return report
 
 

@@ -5,10 +5,11 @@ from collections.abc import Mapping, Sequence
 from typing import Unpack
 
 from jaxdamp import plots
+from jaxdamp._settings import with_defaults
 from jaxdamp._tables import percent_change, typeset_unit
 from jaxdamp._types import DataArray, Dataset, ScalarLike
 from jaxdamp._words import path_words
-from jaxdamp.report.page import Page, Report
+from jaxdamp.report.page import PAGE, Page, Report
 from jaxdamp.sweeps import without_effect
 from jaxdamp.tune import Limits, limit_spans
 
@@ -17,6 +18,7 @@ MOST_AXES = 2  # of a grid that is drawn
 MOST_POINTS = 1000  # in the table of a page
 
 
+@with_defaults(PAGE, title="Sweep")
 def sweep_report(
     data: Dataset,
     *,
@@ -44,7 +46,7 @@ def sweep_report(
     True
     """
     data = data.compute()  # a store is read when it is asked for
-    report = Report.by(sweep_report, "Sweep", page)
+    report = Report(**page)
     report.verdict(*best_points(data, limits, baseline))
     report.points(remarks)
     if len(data["failed"].dims) <= MOST_AXES:

@@ -6,10 +6,11 @@ from typing import Unpack
 import numpy as np
 
 from jaxdamp import _checks, plots
+from jaxdamp._settings import with_defaults
 from jaxdamp._tables import Compared, Table, comparison_table, percent_change
 from jaxdamp._traced import equal
 from jaxdamp.parameters import get
-from jaxdamp.report.page import Page, Report
+from jaxdamp.report.page import PAGE, Page, Report
 from jaxdamp.simulation import Response, Ride
 from jaxdamp.tune import Rescore, TuneResult, damper_paths
 from jaxdamp.vehicles import AbstractVehicle
@@ -18,6 +19,7 @@ from jaxdamp.vehicles import AbstractVehicle
 MOST_COMBINATIONS = 100  # rows of choices on a page, the best first
 
 
+@with_defaults(PAGE, title="Tuning")
 def tuning_report(
     result: TuneResult,
     *,
@@ -41,7 +43,7 @@ def tuning_report(
     >>> result.metric in page.to_html()
     True
     """
-    report = Report.by(tuning_report, "Tuning", page)
+    report = Report(**page)
     report.verdict(result.verdict.sentence, more=[result.ending])
     report.sheet(lambda: result.plot("sheet"), result.verdict.sentence, "ride_sheet")
     report.heading(result.verdict.outcome.value)

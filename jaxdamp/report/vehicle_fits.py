@@ -6,15 +6,17 @@ from typing import Unpack
 import numpy as np
 
 from jaxdamp import plots
+from jaxdamp._settings import with_defaults
 from jaxdamp._tables import Column, Table
 from jaxdamp.bench import RideRecord
 from jaxdamp.identify import VehicleComparison, VehicleFit, without_machine
 from jaxdamp.parameters import get
 from jaxdamp.report.benches import records_table
 from jaxdamp.report.fits import failure_sentences
-from jaxdamp.report.page import Page, Report
+from jaxdamp.report.page import PAGE, Page, Report
 
 
+@with_defaults(PAGE, title="Vehicle fitted to records of its motion")
 def vehicle_fit_report(
     result: VehicleFit,
     *,
@@ -36,12 +38,13 @@ def vehicle_fit_report(
     >>> "may all be larger by one factor" in page.to_html()  # page.write("vehicle.html")
     False
     """
-    report = Report.by(vehicle_fit_report, "Vehicle fitted to records of its motion", page)
+    report = Report(**page)
     report.verdict(_summary(result))
     _add_fit(report, result, remarks)
     return report
 
 
+@with_defaults(PAGE, title="Vehicles fitted to records of their motion")
 def vehicle_comparison_report(
     comparison: VehicleComparison,
     *,
@@ -55,7 +58,7 @@ def vehicle_comparison_report(
         remarks: on the records; their notes if left out.
         page: `title`, `folder` and `attempts`, all optional (see `Page`).
     """
-    report = Report.by(vehicle_comparison_report, "Vehicles fitted to records of their motion", page)
+    report = Report(**page)
     best = comparison.best
     report.verdict(*comparison.verdict)
     report.heading("How good the vehicles are")

@@ -11,7 +11,7 @@ from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
-from jaxdamp._settings import completed
+from jaxdamp._settings import with_defaults
 from jaxdamp._types import Signal, SignalLike, State
 from jaxdamp.dampers import (
     AbstractDamper,
@@ -103,6 +103,7 @@ def respond(
     return_state: Literal[True],
     **settings: Unpack[ResponseSettings],
 ) -> tuple[Signal, State]: ...
+@with_defaults(DEFAULTS)
 def respond(
     law: AbstractDamper,
     time: SignalLike,
@@ -149,9 +150,8 @@ def respond(
     >>> round(float(force[0]), 6)
     120.0
     """
-    asked = completed(respond, settings, DEFAULTS)
-    state, temperature, command = asked["state"], asked["temperature"], asked["command"]
-    substeps, engine, method = asked["substeps"], asked["engine"], asked["method"]
+    state, temperature, command = settings["state"], settings["temperature"], settings["command"]
+    substeps, engine, method = settings["substeps"], settings["engine"], settings["method"]
     check_module("law", law, (AbstractDamper,), "respond(law, time, stroke, velocity)")
     instants, time, stroke = _checks.concrete(time), as_float(time), as_float(stroke)
     _check_record(instants, time, stroke, velocity)
@@ -176,7 +176,7 @@ def respond(
         check_module("engine", engine, (AbstractLawEngine,), "respond(law, time, stroke, engine=...)")
         force = engine.respond(law, time, stroke, rate)
     elif solver is not None:
-        force = solve_law(law, time, stroke, rate, solver, asked["rtol"], asked["atol"])
+        force = solve_law(law, time, stroke, rate, solver, settings["rtol"], settings["atol"])
     else:
         followed = Followed(temperature, command)
         begin = None if state is None else _checked_state(law, state, followed)

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_field_types, check_module
-from jaxdamp._settings import completed
+from jaxdamp._settings import with_defaults
 from jaxdamp._traced import at_compile_time, behind, is_traced
 from jaxdamp._types import Scalar, ScalarLike, Signal
 from jaxdamp.dampers import coverage, warn_outside
@@ -44,6 +44,7 @@ def simulate(
 def simulate(
     vehicle: AbstractVehicle, road: AbstractRoad, *, return_state: Literal[True], **settings: Unpack[SimulationSettings]
 ) -> tuple[Response, RunState]: ...
+@with_defaults(SIMULATION)
 def simulate(
     vehicle: AbstractVehicle, road: AbstractRoad, *, return_state: bool = False, **settings: Unpack[SimulationSettings]
 ) -> Response | tuple[Response, RunState]:
@@ -85,16 +86,15 @@ def simulate(
     >>> round(float(response.metrics()["working_space_peak_to_peak"]), 3)
     0.072
     """
-    asked = completed(simulate, settings, SIMULATION)
-    duration, dt, engine, substeps = asked["duration"], asked["dt"], asked["engine"], asked["substeps"]
-    start, state, every = asked["start"], asked["state"], asked["every"]
+    duration, dt, engine, substeps = settings["duration"], settings["dt"], settings["engine"], settings["substeps"]
+    start, state, every = settings["start"], settings["state"], settings["every"]
     check_module("vehicle", vehicle, (AbstractVehicle,), "simulate(vehicle, road)")
     check_module("road", road, (AbstractRoad,), "simulate(vehicle, road)")
     refuse_stacked(vehicle)
     if engine is not None:
         check_module("engine", engine, (AbstractEngine,), "simulate(vehicle, road, engine=...)")
-    if any(asked[name] is not None for name in ("method", "rtol", "atol")):
-        engine = _by_method(asked)
+    if any(settings[name] is not None for name in ("method", "rtol", "atol")):
+        engine = _by_method(settings)
         substeps = None
     engine, dt = chosen_engine(engine, Exponential(substeps=substeps), dt, substeps)
     system = vehicle.system()

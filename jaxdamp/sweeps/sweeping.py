@@ -14,7 +14,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress, tell
-from jaxdamp._settings import completed
+from jaxdamp._settings import with_defaults
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import DataArray, Dataset
 from jaxdamp._writing import whole
@@ -77,6 +77,7 @@ def sweep(
     function: PointFunction, over: Over, *, summary: Summary, **settings: Unpack[SweepSettings]
 ) -> SweepSummary: ...
 @of_known_numbers
+@with_defaults(DEFAULTS)
 def sweep(
     function: PointFunction,
     over: Mapping[str, object] | AbstractPoints,
@@ -113,7 +114,7 @@ def sweep(
     Returns:
         The results by name with the axes as dimensions (for a list, along `point`). Of a `Ride`, `attrs["loop"]` says
         by what its loop was compiled at the end: XLA, or the C compiler where a long sweep found that to be faster; the
-        numbers are the same to rounding. From a `.zarr` store they are read when they are asked for, and
+        numbers are the same to rounding. From a `.zarr` store they are read when they are settings for, and
         `attrs["points_done"]` counts those that are done; each process chooses its loop, which is not noted. With
         `summary`, a `SweepSummary` of the points that are done.
 
@@ -125,10 +126,10 @@ def sweep(
     >>> float(data["product"].sel(a=2.0, b=5.0))
     10.0
     """
-    asked = completed(sweep, settings, DEFAULTS)
-    gradients, file, cluster, progress = asked["gradients"], asked["file"], asked["cluster"], asked["progress"]
+    gradients, file = settings["gradients"], settings["file"]
+    cluster, progress = settings["cluster"], settings["progress"]
     _check_call(function, gradients, file, by_block=cluster is not None or (file is not None and summary is not None))
-    computation = Computation(function, as_points(over), gradients, asked["chunk"], asked["devices"])
+    computation = Computation(function, as_points(over), gradients, settings["chunk"], settings["devices"])
     if summary is not None:
         return summarise(BlockProgram(computation), summary, None if file is None else str(file), cluster, progress)
     if file is not None and Path(file).suffix == ".zarr":

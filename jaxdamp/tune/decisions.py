@@ -15,7 +15,7 @@ from jaxdamp._field_types import check_module
 from jaxdamp._jacobian import with_jacobian
 from jaxdamp._progress import Progress
 from jaxdamp._results import AbstractResult, drawn_by
-from jaxdamp._settings import completed
+from jaxdamp._settings import with_defaults
 from jaxdamp._tables import Column, Contents, Table, plain, typeset_unit
 from jaxdamp._traced import equal, of_known_numbers
 from jaxdamp.dampers import AbstractDamper
@@ -150,6 +150,7 @@ class _DamperMetrics(NamedTuple):
 
 
 @of_known_numbers
+@with_defaults(RUN)
 def compare_dampers(
     dampers: Mapping[str, AbstractDamper | FittedLaw],
     vehicle: Callable[[AbstractDamper], AbstractVehicle],
@@ -184,7 +185,6 @@ def compare_dampers(
     >>> round(compared.difference("rms_sprung_acceleration").change, 2)
     -8.68
     """
-    driven = completed(compare_dampers, run, RUN)
     _check(dampers, vehicle, roads)
     listed = [roads] if isinstance(roads, WhiteRoad) else list(roads)
     by_damper, warnings, units, first = {}, [], {}, None
@@ -194,7 +194,7 @@ def compare_dampers(
             car = vehicle(damper if isinstance(damper, AbstractDamper) else damper.law)
             check_module("vehicle", car, (AbstractVehicle,), "compare_dampers(dampers, vehicle, roads)")
             sampled = listed if first is None else listed[:1]  # the same roads for all dampers
-            ride = Scenarios(sampled).ride(car, metrics=_chosen(car, listed, metrics), **driven)
+            ride = Scenarios(sampled).ride(car, metrics=_chosen(car, listed, metrics), **run)
             first = ride if first is None else first
             ride = eqx.tree_at(lambda one: one.roads, ride, first.roads)
             units = {m.name: m.unit(car.units) for m in ride.metrics}

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp._progress import Progress
-from jaxdamp._settings import completed
+from jaxdamp._settings import with_defaults
 from jaxdamp._status import Status
 from jaxdamp._tables import typeset_unit
 from jaxdamp._traced import of_known_numbers
@@ -50,6 +50,7 @@ TIGHTENED = 2  # times that a search is repeated with limits that did not hold o
 
 
 @of_known_numbers
+@with_defaults(DEFAULTS)
 def minimise(
     metric: str | Metric | Function,
     vehicle: V,
@@ -112,19 +113,18 @@ def minimise(
     >>> bounded.parameters[0].note
     'at its upper bound'
     """
-    asked = completed(minimise, settings, DEFAULTS)
     check_objective("metric", metric, "The call is `minimise(metric, vehicle, road)`.")
-    check_call("minimise(metric, vehicle, road)", vehicle, road, asked)
-    task = DesignTask([metric], vehicle, road, argument="metric", settings=asked)
-    fresh_roads, name = asked["fresh_roads"], task.objective.name
-    evaluator = Evaluator(task, asked["starts"])
-    starts = start_points(task.space, asked["starts"], asked["seed"]) / task.space.unit
+    check_call("minimise(metric, vehicle, road)", vehicle, road, settings)
+    task = DesignTask([metric], vehicle, road, argument="metric", settings=settings)
+    fresh_roads, name = settings["fresh_roads"], task.objective.name
+    evaluator = Evaluator(task, settings["starts"])
+    starts = start_points(task.space, settings["starts"], settings["seed"]) / task.space.unit
     evaluations, limits = evaluator.begin(starts)
     with Progress("Tuning") as shown:
         progress = progress or (lambda step, value: shown(f"step {step}, {name} {value:.5g}"))
         combining = every_combination(evaluator, progress)
         task.refuse_constant(evaluations[0], [one.evaluation for one in combining.ends] if combining else ())
-        descent = combining or Descent(evaluator, asked["max_steps"], progress)
+        descent = combining or Descent(evaluator, settings["max_steps"], progress)
         several = descent.search(starts, evaluations, limits)
         ended, tighter = _best(descent, several, limits), limits
         fresh = _on_fresh_roads(evaluator, (task.space.start, ended.values), range(fresh_roads), task.allowed)
@@ -141,7 +141,7 @@ def minimise(
             others = range(again * fresh_roads, (again + 1) * fresh_roads)
             fresh = _on_fresh_roads(evaluator, (task.space.start, ended.values), others, task.allowed)
         attempts = _attempts(task, starts, several, limits) if len(several) > 1 else ()
-        result = _result(task, evaluations[0], ended, attempts, (limits, tighter), fresh, asked)
+        result = _result(task, evaluations[0], ended, attempts, (limits, tighter), fresh, settings)
     combinations = None if combining is None else _beside_next(evaluator, combining.combinations(tighter), fresh_roads)
     return dataclasses.replace(result, combinations=combinations)
 
@@ -211,9 +211,10 @@ def _result(
     idle = without_effect(space, (start, ended.evaluation), ended.values)
     short = missed(limits[0], after, task.tolerance)
     held = reached(limits[1], after, task.tolerance)
+    tightened = tuple(dict.fromkeys(one.of for one, searched in zip(*limits, strict=True) if one != searched))
     status, changes = _status(task, ended, short), space.changes(ended.values)
     notes = missed_notes(short, after, changes) + true_value_notes(objective, after, before, task.allowed)
-    notes += tightened_notes(*limits) + workshop_notes(space) + effect_notes(idle, objective.name)
+    notes += tightened_notes(tightened) + workshop_notes(space) + effect_notes(idle, objective.name)
     notes += bound_notes(space, changes) + start_notes(attempts, objective.name)
     if status in (Status.STEP_LIMIT, Status.NO_BETTER_STEP):
         notes.append(early_end(ended, asked["max_steps"]))
@@ -235,7 +236,7 @@ def _result(
         status=status,
         history=ended.history,
         objective=objective,
-        active=active_words(held, after, changes, space, ended.values),
+        active=active_words(held, after, changes, space, ended.values, tightened),
         fresh=fresh,
         starts=attempts,
         scenarios=each,
@@ -246,6 +247,7 @@ def _result(
         allowed=task.allowed,
         elsewhere=_where(task, asked["fresh_roads"]),
         relaxation=_relaxation(task, ended, limits),
+        tightened=tightened,
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
-from jaxdamp._settings import completed
+from jaxdamp._settings import with_defaults
 from jaxdamp._status import Status
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, current_name
@@ -35,6 +35,7 @@ FRESH_ROADS, MAX_STEPS = 3, 40  # by default
 
 
 @of_known_numbers
+@with_defaults(DEFAULTS, fresh_roads=FRESH_ROADS, max_steps=MAX_STEPS)
 def pareto(
     objectives: Sequence[str | Metric | Function],
     vehicle: V,
@@ -85,13 +86,12 @@ def pareto(
     >>> [round(float(rate), -1) for rate in front.designs[[0, -1], 0]]  # the two optima: 4656.4 and 5536.5
     [4660.0, 5540.0]
     """
-    asked = completed(pareto, settings, DEFAULTS | {"fresh_roads": FRESH_ROADS, "max_steps": MAX_STEPS})
-    _check(objectives, vehicle, road, points, asked | {"points": points, "between": between})
-    task = DesignTask(objectives, vehicle, road, argument="objectives", settings=asked)
+    _check(objectives, vehicle, road, points, settings | {"points": points, "between": between})
+    task = DesignTask(objectives, vehicle, road, argument="objectives", settings=settings)
     names, space, evaluator = task.objective.names, task.space, Evaluator(task, LANES)
     given = _reference(reference, names)
     _refuse_choices(space)
-    starts = start_points(space, asked["starts"], asked["seed"]) / space.unit
+    starts = start_points(space, settings["starts"], settings["seed"]) / space.unit
     evaluations, limits = evaluator.begin(starts)
     usable = [i for i, one in enumerate(evaluations) if i == 0 or all(np.all(np.isfinite(a)) for a in one)]
     before = task.numbers(evaluations[0].values)
@@ -104,7 +104,7 @@ def pareto(
             else:
                 shown(f"{done} of {total} points, {evaluator.program.points} designs simulated")
 
-        problem = FrontProblem(evaluator, limits, asked["max_steps"], size, report)
+        problem = FrontProblem(evaluator, limits, settings["max_steps"], size, report)
         states = trace_front(problem, starts[usable], [evaluations[i] for i in usable], points)
     chosen, status, notes = _judged(states, problem)
     designs = np.array([np.clip(state.y * space.unit, space.lower, space.upper) for state in chosen])
@@ -113,7 +113,7 @@ def pareto(
     filled = between if len(chosen) > len(names) else 0
     if filled:
         designs, numbers = _with_designs_between(evaluator, designs, numbers, limits, between)
-    fresh, start_on_fresh = _on_fresh_roads(evaluator, designs, asked["fresh_roads"])
+    fresh, start_on_fresh = _on_fresh_roads(evaluator, designs, settings["fresh_roads"])
     front = ParetoFront[V](
         start=vehicle,
         names=names,

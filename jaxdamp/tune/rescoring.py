@@ -13,7 +13,7 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._pieces import piece
 from jaxdamp._results import AbstractResult, drawn_by
-from jaxdamp._settings import completed
+from jaxdamp._settings import with_defaults
 from jaxdamp._tables import Column, Compared, Contents, Table, comparison_table, plain
 from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric
@@ -168,6 +168,7 @@ class Rescore(AbstractResult):
         return {"metric": self.metric, "roads": self.roads, "metrics": metrics}
 
 
+@with_defaults(RUN)
 def rescore(
     result: "TuneResult[AbstractVehicle]",
     roads: Sequence[AbstractRoad | Scenarios],
@@ -208,7 +209,7 @@ def rescore(
     metrics += [m for m in (objective.metrics if objective else ()) if m not in metrics]
     units = {m.name: m.unit(result.start.units) for m in metrics} | (objective.units(result.start) if objective else {})
     cars = (result.start, result.vehicle)
-    drive = driver(cars, metrics, objective, completed(rescore, run, RUN))
+    drive = driver(cars, metrics, objective, run)
     return rescored(drive, roads, units, result.metric)
 
 

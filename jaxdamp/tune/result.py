@@ -22,7 +22,7 @@ from jaxdamp.tune.ranges import Change
 from jaxdamp.tune.rescoring import Rescore, Spectrum, spectra
 from jaxdamp.tune.scenarios import Road
 from jaxdamp.tune.settings import Run
-from jaxdamp.tune.verdict import Verdict, mean_change, verdict_of
+from jaxdamp.tune.verdict import Verdict, at_limit, mean_change, verdict_of
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -83,7 +83,8 @@ class TuneResult(AbstractResult, Generic[V]):
         after: all ride metrics of the tuned vehicle.
         units: unit of each metric.
         limits: largest allowed value of metrics, or the smallest and the largest one.
-        active_limits: names of the metrics at their limit.
+        active_limits: names of the metrics at the limit of the search.
+        tightened: names of the metrics whose limit was tighter in the search, so that it holds on other roads.
         warnings: doubts about the result, in words.
         status: how the search ended; `CONVERGED` only if the gradient condition of an optimum is satisfied, or if every
             combination of choices was driven.
@@ -130,6 +131,7 @@ class TuneResult(AbstractResult, Generic[V]):
     elsewhere: str = ""
     tolerances: tuple[ToleranceEffect, ...] = ()
     relaxation: str = ""
+    tightened: tuple[str, ...] = ()
     combinations: "Combinations | None" = None
 
     @property
@@ -158,7 +160,7 @@ class TuneResult(AbstractResult, Generic[V]):
         """The change on the road of the tuning, bounds and limits with their price, and extreme scenarios, in words."""
         before, after, unit = self.before[self.metric], self.after[self.metric], self.units[self.metric]
         share = f" ({100 * (after / before - 1):+.1f} %)" if before else ""
-        stops = [f"{name} at its limit" for name in self.active_limits]
+        stops = [f"{name} {at_limit(self, name)}" for name in self.active_limits]
         at_bounds = [f"{change.name} {change.note}" for change in self.parameters if change.note]
         inside = "" if at_bounds else "all parameters inside their bounds"
         few = len(at_bounds) <= NAMED
@@ -215,6 +217,7 @@ class TuneResult(AbstractResult, Generic[V]):
         span = self.limits[name]
         shown, (lower, upper) = display().of(self.units[name]), span if isinstance(span, tuple) else (-math.inf, span)
         text = f"{written((shown(lower), shown(upper)))} {typeset_unit(shown.unit)}".rstrip()
+        text += ", tightened" * (name in self.tightened)
         mark = ", violated" if name in self.violated else ", reached" * (name in self.active_limits)
         return "; ".join(filter(None, (f"{text}{mark}", target)))
 
@@ -287,7 +290,7 @@ class TuneResult(AbstractResult, Generic[V]):
     def content(self) -> _tables.Contents:
         """The tuning as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         sides = {"before": self.before, "after": self.after}
-        words = ("metric", "violated", "active", "active_limits", "relaxation", "without_effect")
+        words = ("metric", "violated", "active", "active_limits", "tightened", "relaxation", "without_effect")
         return self._data(*words, "parameters", "scenarios", "starts", "tolerances", "history") | {
             "verdict": self.verdict.outcome.name,
             "metrics": {

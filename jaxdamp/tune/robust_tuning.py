@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
-from jaxdamp._settings import completed
+from jaxdamp._settings import part, with_defaults
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric
 from jaxdamp.parameters import match_paths
@@ -18,11 +18,12 @@ from jaxdamp.tune.result import ToleranceEffect, TuneResult, V
 from jaxdamp.tune.scenario_ride import Risk
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.sensitivities import sensitivity
-from jaxdamp.tune.settings import RUN, Run, Settings
+from jaxdamp.tune.settings import DEFAULTS, RUN, Run, Settings
 from jaxdamp.vehicles import AbstractVehicle
 
 
 @of_known_numbers
+@with_defaults(DEFAULTS)
 def robust(
     metric: str | Metric | Function,
     vehicle: V,
@@ -66,12 +67,12 @@ def robust(
     tuning = minimise(metric, vehicle, scenarios, progress=progress, **settings)
     if not scatter:
         return tuning
-    run = Run(duration=settings.get("duration"), dt=settings.get("dt"), engine=settings.get("engine"))
-    effects = tolerance_effects(metric, tuning.vehicle, scenarios, scatter, **run)
+    effects = tolerance_effects(metric, tuning.vehicle, scenarios, scatter, **part(settings, RUN))
     return dataclasses.replace(tuning, tolerances=effects)
 
 
 @of_known_numbers
+@with_defaults(RUN)
 def tolerance_effects(
     metric: str | Metric | Function,
     vehicle: AbstractVehicle,
@@ -104,7 +105,6 @@ def tolerance_effects(
     if isinstance(metric, Sequence) and not isinstance(metric, str):
         remedy = "Call it once for each metric."
         _checks.refuse("metric", "be a single one", _checks.described(metric), remedy)
-    completed(tolerance_effects, run, RUN)
     result = sensitivity(metric, vehicle, road, over=list(scatter), dampers=None, second_order=True, **run)
     ((name, value),) = result.values.items()
     assert result.hessian is not None

@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._jacobian import with_jacobian
-from jaxdamp._settings import completed, part
+from jaxdamp._settings import part, with_defaults
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Number, Scalar, ScalarLike, Vector
 from jaxdamp.dampers import AbstractMemoryless
@@ -68,6 +68,7 @@ DEFAULTS: SensitivitySettings = {
 
 
 @of_known_numbers
+@with_defaults(DEFAULTS)
 def sensitivity(
     metric: str | Metric | Function | Sequence[str | Metric],
     vehicle: AbstractVehicle,
@@ -107,14 +108,13 @@ def sensitivity(
     >>> {name: round(float(value), 3) for name, value in result.elasticities("rms_sprung_acceleration").items()}
     {'sprung_mass': -0.648, 'damper.rate': -0.276}
     """
-    asked = completed(sensitivity, settings, DEFAULTS)
     wanted = list(metric) if isinstance(metric, Sequence) and not isinstance(metric, str) else [metric]
     given = dict(quantities or {})
     _check(wanted, vehicle, road, given)
-    first, run = (road if isinstance(road, GIVEN) else road(**given)), part(asked, RUN)
+    first, run = (road if isinstance(road, GIVEN) else road(**given)), part(settings, RUN)
     objective = _objective(wanted, vehicle, white=is_white(first))
-    hatted, paths = _with_curves(vehicle, first, asked, run)
-    of_vehicle, free = _free(vehicle, hatted, asked["over"], asked["freeze"])
+    hatted, paths = _with_curves(vehicle, first, settings, run)
+    of_vehicle, free = _free(vehicle, hatted, settings["over"], settings["freeze"])
     point = np.array([*np.asarray(free.values, float), *given.values()])
     measured = _measured(hatted, road, list(given), objective, free, run)
     names = [name for name in objective.units(vehicle) if name in objective.names]

@@ -14,7 +14,7 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._jacobian import with_jacobian
 from jaxdamp._progress import Progress
-from jaxdamp._settings import completed
+from jaxdamp._settings import with_defaults
 from jaxdamp._status import Status
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._triangles import triangle
@@ -89,6 +89,7 @@ class _End(NamedTuple):
 
 
 @of_known_numbers
+@with_defaults(DEFAULTS)
 def valving(
     target: Target,
     start: MonoTube | TwinTube,
@@ -134,21 +135,21 @@ def valving(
     (True, True)
     """
     check_module("start", start, (MonoTube, TwinTube), "valving(target, start)")
-    asked = completed(valving, settings, DEFAULTS)
     valves = ["piston.*", *["base.*"] * isinstance(start, TwinTube)]
-    over = [*valves, "gas.pressure"] if asked["over"] is None else asked["over"]
+    over = [*valves, "gas.pressure"] if settings["over"] is None else settings["over"]
     _checks.positive("tolerance", tolerance)
-    _checks.counts(starts=asked["starts"], substeps=substeps, max_steps=asked["max_steps"])
+    starts, max_steps = settings["starts"], settings["max_steps"]
+    _checks.counts(starts=starts, substeps=substeps, max_steps=max_steps)
     wanted = _wanted(target, start, velocities, motions)
     size = float(np.sqrt(np.mean(wanted.all_forces**2)))
     if not size > 0.0:
         _checks.refuse("target", "have a force", "zero everywhere")
-    space = search_range(start, over, asked["freeze"], asked["bounds"])
+    space = search_range(start, over, settings["freeze"], settings["bounds"])
     charge = np.array([name == "gas.pressure" for name in space.free.names])  # which must stay above that of a cavity
     cavity = (1.0 + INSIDE) * float(start.cavitation_pressure)
     space = dataclasses.replace(space, lower=np.where(charge, np.maximum(space.lower, cavity), space.lower))
     force_of = _forces(space.free, wanted, substeps)
-    best = _best(space, force_of, wanted.all_forces, asked["starts"], asked["max_steps"], CLOSE_ENOUGH * tolerance)
+    best = _best(space, force_of, wanted.all_forces, starts, max_steps, CLOSE_ENOUGH * tolerance)
     if best is None:
         _checks.refuse("start", "give a finite force", start, "Widen its valves, or shorten the motion.")
     reached, slopes = force_of(best.values)

@@ -132,13 +132,19 @@ def mean_change(result: "TuneResult[AbstractVehicle]", name: str) -> float | Non
     return change if np.isfinite(change) else None
 
 
+def at_limit(result: "TuneResult[AbstractVehicle]", name: str) -> str:
+    """How a metric stands at its limit, in words; nothing for one that does not."""
+    which = "tightened limit" if name in result.tightened else "limit"
+    return f"at its {which}" if name in result.active_limits else ""
+
+
 def _limits_in_words(result: "TuneResult[AbstractVehicle]") -> str:
     """How much of each limit is used, and on how many fresh roads it is broken."""
     texts = []
     for name in result.limits:
         after, change = result.after[name], mean_change(result, name)
         share = f"{after:.4g} {typeset_unit(result.units[name])}".rstrip() if change is None else f"{change:+.1f} %"
-        text = f"{name} {share}{', at its limit' * (name in result.active_limits)}"
+        text = f"{name} {share}{', ' * (name in result.active_limits)}{at_limit(result, name)}"
         if result.fresh is not None and name in result.allowed:
             beyond = int(np.sum(excess(result.fresh, name, result.allowed[name]) > WITHIN))
             text += f", beyond it on {beyond} of {result.fresh.roads} fresh roads" * bool(beyond)
@@ -263,11 +269,12 @@ def active_words(
     changes: Sequence[Change],
     space: SearchRange,
     ended: np.ndarray,
+    tightened: Sequence[str],
 ) -> tuple[str, ...]:
     """What holds the search, in words: limits, shapes, bounds, and neighbours in ordered vectors."""
     groups: dict[str, list[str]] = {}
     for limit in held:
-        text = f"{limit.of} {limit.nearer(values[limit.name])}"
+        text = f"{limit.of} {limit.nearer(values[limit.name])}{' (tightened)' * (limit.of in tightened)}"
         groups.setdefault(text, []).append(limit.name.removeprefix(limit.of))
     words = []
     for text, (first, *others) in groups.items():
@@ -306,12 +313,10 @@ def violations(short: Sequence[Limit], values: Mapping[str, float]) -> dict[str,
     }
 
 
-def tightened_notes(limits: Sequence[Limit], searched: Sequence[Limit]) -> list[str]:
-    """A sentence on the limits that were tighter in the search than they are."""
-    pairs = zip(limits, searched, strict=True)
-    tight = [one.name for one, other in pairs if (one.lower, one.upper) != (other.lower, other.upper)]
+def tightened_notes(tightened: Sequence[str]) -> list[str]:
+    """A sentence on the metrics whose limits were tighter in the search than they are."""
     words = "Tightened on the road of the tuning, so that they hold on others: the limits of"
-    return [f"{words} {', '.join(tight)}."] if tight else []
+    return [f"{words} {', '.join(tightened)}."] if tightened else []
 
 
 def workshop_notes(space: SearchRange) -> list[str]:

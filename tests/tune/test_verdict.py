@@ -205,6 +205,9 @@ def test_a_limit_that_only_other_roads_break_is_tightened_from_the_value_reached
     result = tune.minimise("working_space_rms", stiff, WHITE, limits={TYRE: 1.2 * reached}, fresh_roads=4)
     assert asked == [range(4), range(4, 8)]
     assert result.after[TYRE] == pytest.approx((1.0 - 0.03 * 1.2) * reached, rel=1e-4)
+    for words in (result.verdict.sentence, result.ending):  # nowhere near the limit itself
+        assert "at its tightened limit" in words and "at its limit" not in words
+    assert result.active[0].endswith("N (tightened)") and "tightened, reached" in result.table().to_text()
 
 
 def test_the_end_of_a_limit_that_is_nearer_is_tightened():
