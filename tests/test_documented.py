@@ -42,7 +42,7 @@ def arguments(value: Any) -> list[str]:
     declared = {name for name, field in fields.items() if {"parameter", "setting"} & set(field.metadata)}
     given = {"range_note"} if isinstance(value, type) and issubclass(value, AbstractDamper) else set()
     given |= {"args", "kwargs"} if getattr(value, "_is_protocol", False) else set()
-    return [name for name in inspect.signature(value).parameters if name not in declared | given]
+    return [name for name in inspect.signature(inspect.unwrap(value)).parameters if name not in declared | given]
 
 
 def documentation(value: Any) -> str:
@@ -101,7 +101,7 @@ def test_typed_keywords_are_described_with_unit_and_default(package: str) -> Non
     """Those of `**settings: Unpack[Settings]`: by the class, or by the function."""
     missing = []
     for name, value in public(package):
-        given = inspect.signature(value).parameters.values() if inspect.isfunction(value) else ()
+        given = inspect.signature(inspect.unwrap(value)).parameters.values() if inspect.isfunction(value) else ()
         if any(get_origin(p.annotation) is Unpack for p in given):
             keywords = {argument.name: argument for argument in signatures.arguments(f"{package}.{name}")}
             for keyword in keywords.keys() - {p.name for p in given}:
