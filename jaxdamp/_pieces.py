@@ -7,12 +7,12 @@ import hashlib
 import io
 import pickle
 import shutil
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
+from jaxdamp._warned import warn
 from jaxdamp._writing import write_whole
 
 
@@ -68,7 +68,7 @@ def piece(inputs: tuple[object, ...], compute: Callable[[], T]) -> T:
 
 def _not_kept(error: Exception) -> None:
     """The computation is worth more than its pieces."""
-    warnings.warn(f"A finished piece could not be kept for --resume: {error}.", stacklevel=3)
+    warn(f"A finished piece could not be kept for --resume: {error}.")
 
 
 def _read(file: Path) -> bytes | None:

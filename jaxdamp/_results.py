@@ -1,7 +1,6 @@
 """What every result has: status, warnings, summary, table, plot, plain data, report."""
 
 import os
-import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -11,6 +10,7 @@ from jaxdamp import _checks
 from jaxdamp._status import Status
 from jaxdamp._tables import Contents, Table, plain, with_unit
 from jaxdamp._types import Figure
+from jaxdamp._warned import warn
 
 
 T = TypeVar("T")
@@ -138,7 +138,7 @@ def plotted(
         ValueError: an unknown kind.
     """
     if before and not isinstance(kind, str):
-        warnings.warn(f"Write `plot({before}=...)`: `kind` comes first now.", DeprecationWarning, stacklevel=3)
+        warn(f"Write `plot({before}=...)`: `kind` comes first now.", DeprecationWarning)
         kind, options = next(iter(kinds)), {before: kind, **options}
     name = str(kind)
     _checks.one_of("kind", name, kinds)
@@ -157,5 +157,5 @@ class CallableText(str):
     def __call__(self) -> str:
         """Deprecated: the text."""
         text = "`summary` is a property now: write `result.summary` without brackets."
-        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        warn(text, DeprecationWarning)
         return str(self)

@@ -61,9 +61,14 @@ def is_traced(tree: PyTree) -> bool:
     return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(tree))
 
 
+def is_inside_program() -> bool:
+    """Whether JAX is tracing a function that it compiles."""
+    return unsafe_am_i_under_a_jit_DO_NOT_USE()
+
+
 def at_compile_time() -> AbstractContextManager[None]:
     """Inside `jax.jit`: compute with known numbers now, rather than in the program."""
-    return jax.ensure_compile_time_eval() if unsafe_am_i_under_a_jit_DO_NOT_USE() else nullcontext()
+    return jax.ensure_compile_time_eval() if is_inside_program() else nullcontext()
 
 
 def is_batched(tree: PyTree) -> bool:

@@ -9,7 +9,6 @@ import platform
 import queue
 import threading
 import time
-import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
@@ -21,6 +20,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._one_thread import usable_cores
 from jaxdamp._progress import Progress, tell
+from jaxdamp._warned import warn
 from jaxdamp.blocks.store import AbstractStore
 
 
@@ -93,9 +93,7 @@ def fill(
     own = range(part - 1, store.blocks.count, parts)
     damaged = store.repair(own)
     if damaged:
-        warnings.warn(
-            f"{damaged} blocks in {store.path} were damaged on the disk, and are computed anew.", stacklevel=5
-        )
+        warn(f"{damaged} blocks in {store.path} were damaged on the disk, and are computed anew.")
     left = [int(number) for number in store.left() if number in own]
     total, missing = (sum(map(store.blocks.size, numbers)) for numbers in (own, left))
     done, start = total - missing, time.monotonic()

@@ -1,6 +1,5 @@
 """The force as a smooth surface over stroke and velocity, fitted to data: Chebyshev polynomials of two axes."""
 
-import warnings
 from typing import NamedTuple, final
 
 import equinox as eqx
@@ -11,6 +10,7 @@ from jaxtyping import Array, Bool, Float
 from jaxdamp import _checks
 from jaxdamp._limits import within
 from jaxdamp._types import Matrix, Number, Scalar, ScalarLike, Vector
+from jaxdamp._warned import warn
 from jaxdamp.dampers.base import AbstractStateless
 from jaxdamp.dampers.contract import Traits
 from jaxdamp.parameters import around_zero, ends, nonnegative, parameter, setting
@@ -117,12 +117,11 @@ def surface_least_squares(
     shares = sizes / sizes[0]
     thin = int(np.count_nonzero(shares < THIN))
     if thin:
-        warnings.warn(
+        warn(
             f"The records do not determine {thin} of {len(shares)} combinations of the coefficients of the surface"
             f" (singular values below {THIN:g} of the largest). The samples of a single sine, for example, are on one"
             " ellipse. Add records of other amplitudes and frequencies, or use lower degrees.",
             np.exceptions.RankWarning,
-            stacklevel=3,
         )
 
     rounding = len(basis) * np.finfo(float).eps

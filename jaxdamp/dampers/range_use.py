@@ -1,6 +1,5 @@
 """By how much a law is used outside the range that it was fitted to."""
 
-import warnings
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple, TypeVar
 
@@ -9,6 +8,7 @@ from jaxtyping import Bool, Float
 
 from jaxdamp import _checks
 from jaxdamp._traced import is_traced, of_known_numbers
+from jaxdamp._warned import warn
 from jaxdamp.dampers.base import AbstractDamper, laws_inside
 from jaxdamp.dampers.fitted_range import (
     UNITS,
@@ -155,15 +155,14 @@ def sentence(name: str, uses: Sequence[RangeUse]) -> str:
     return f"{name}: {'; '.join(lines)}." if left else ""
 
 
-def warn_outside(sentences: Sequence[str], stacklevel: int = 3) -> None:
-    """Warn of each damper that leaves its range, at the line of who called the caller.
+def warn_outside(sentences: Sequence[str]) -> None:
+    """Warn of each damper that leaves its range.
 
     Arguments:
         sentences: what to warn of, one for each damper; empty ones are left out.
-        stacklevel: as in `warnings.warn`.
     """
     for text in filter(None, sentences):
-        warnings.warn(f"Extrapolated: {text}", OutsideFittedRangeWarning, stacklevel=stacklevel)
+        warn(f"Extrapolated: {text}", OutsideFittedRangeWarning)
 
 
 @of_known_numbers

@@ -8,7 +8,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import warnings
 import xml.etree.ElementTree as ET
 import zipfile
 from collections.abc import Iterator
@@ -20,6 +19,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._unit_registry import unit_registry
+from jaxdamp._warned import warn
 from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.export._c_text import controller_source, law_source, vehicle_source
@@ -277,7 +277,7 @@ def _binary(contents: dict[str, bytes], name: str, compiler: str) -> dict[str, b
     command = shutil.which(compiler)
     if command is None:
         said = f"There is no compiler {compiler!r}: {name}.fmu has C sources and no binary."
-        warnings.warn(f"{said} Pass `compiler=...`, or None to leave the binary out.", stacklevel=3)
+        warn(f"{said} Pass `compiler=...`, or None to leave the binary out.")
         return {}
     system, ending = _PLATFORMS[sys.platform]
     with tempfile.TemporaryDirectory() as folder:

@@ -1,7 +1,6 @@
 """A law as a force-velocity table, and as the table of a vehicle simulator, in its units and with its sign."""
 
 import os
-import warnings
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,6 +11,7 @@ from jaxdamp._display import display
 from jaxdamp._field_types import check_module
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import VectorLike
+from jaxdamp._warned import warn
 from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper, extrapolated, without_fitted_ranges
 from jaxdamp.rig import quasi_static, respond
@@ -91,7 +91,7 @@ def settled_table(law: AbstractDamper, velocities: VectorLike, call: str) -> Set
 def warn_of_rows(written: Path, table: SettledTable) -> None:
     """A Python warning of rows that are not in the file."""
     if table.left_out:
-        warnings.warn(f"{written.name}: rows left out. {table.left_out}", stacklevel=3)
+        warn(f"{written.name}: rows left out. {table.left_out}")
 
 
 def _range_lines(law: AbstractDamper, velocity: np.ndarray) -> list[str]:

@@ -4,7 +4,6 @@ import hashlib
 import json
 import os
 import re
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, final, overload
@@ -15,6 +14,7 @@ from filelock import FileLock
 
 from jaxdamp import _checks
 from jaxdamp._status import Status
+from jaxdamp._warned import warn
 from jaxdamp.bench import BenchRun, DamperRecords
 from jaxdamp.blocks import AbstractWork, Blocks, BlockStore, Cluster, Variable, fill, stored_blocks
 from jaxdamp.identify.many_records import AllRecords, Options, begun_on, fitted_records, refuse_several_laws
@@ -180,7 +180,7 @@ def _found(store: BlockStore, rows: np.ndarray, names: tuple[str, ...]) -> dict[
     if left:
         some = ", ".join(left[:5]) + ", …" * (len(left) > 5)
         words = f"{len(left)} of {len(names)} dampers were left out: {some}. `many.remarks` says why."
-        warnings.warn(words, stacklevel=6)
+        warn(words)
     not_done = [
         reason or "its block is not done yet" * (s is Status.LEFT_OUT)
         for reason, s in zip(reasons, status, strict=True)

@@ -1,8 +1,6 @@
 """`Metric`, a statistic of a channel; names of metrics, renamed ones too, and values by name."""
 
 import dataclasses
-import inspect
-import warnings
 from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, final
@@ -11,6 +9,7 @@ import jax
 
 from jaxdamp import _checks
 from jaxdamp._tables import Compared, Contents, Table, comparison_table, with_unit
+from jaxdamp._warned import warn
 from jaxdamp.metrics.statistics import STATISTICS, Statistic
 from jaxdamp.metrics.weighted import check_weighting
 
@@ -113,8 +112,6 @@ class Metric:
 # an entry after one release.
 RENAMED = {"working_space_peak": "working_space_peak_to_peak"}
 
-_INSIDE = ("jaxdamp", "jaxtyping", "equinox", "jax")  # packages that are skipped in search of the line to warn at
-
 
 def current_name(name: str, known: Collection[str]) -> str:
     """The current name of a metric: for a renamed one the new name, with a `FutureWarning`.
@@ -126,16 +123,8 @@ def current_name(name: str, known: Collection[str]) -> str:
     new = _new_name(name, known)
     if new is None:
         return name
-    _warn(f"The metric {name!r} is now called {new!r}; use that name.")
+    warn(f"The metric {name!r} is now called {new!r}; use that name.", FutureWarning)
     return new
-
-
-def _warn(text: str) -> None:
-    """Warn at the line of user code that called this package."""
-    level, frame = 1, inspect.currentframe()
-    while frame is not None and frame.f_globals.get("__name__", "").split(".")[0] in _INSIDE:
-        level, frame = level + 1, frame.f_back
-    warnings.warn(text, FutureWarning, stacklevel=level)
 
 
 def _new_name(name: object, known: Collection[str]) -> str | None:

@@ -1,6 +1,5 @@
 """The force of a law under a prescribed stroke."""
 
-import warnings
 from abc import abstractmethod
 from typing import TYPE_CHECKING, Literal, TypedDict, Unpack, overload
 
@@ -13,6 +12,7 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._settings import with_defaults
 from jaxdamp._types import Signal, SignalLike, State
+from jaxdamp._warned import warn
 from jaxdamp.dampers import (
     AbstractDamper,
     Motion,
@@ -236,7 +236,7 @@ def _warn_of_motion(law: AbstractDamper, velocity: Signal) -> None:
         "`rig.quasi_static(law, velocity[:1]).states[0]`, that after a cycle (`return_state=True`), or "
         "`law.initial_state()` if it is meant."
     )
-    warnings.warn(text, StartsInMotionWarning, stacklevel=3)
+    warn(text, StartsInMotionWarning)
 
 
 def _of_instants(law: AbstractDamper, temperature: Float[ArrayLike, "..."], time: Signal) -> Signal:
@@ -265,7 +265,7 @@ def _warn_of_range(law: AbstractDamper, *channels: Signal) -> None:
         if all(values is not None for values in known):
             stroke, velocity, force = (np.asarray(values, dtype=float) for values in known)
             motion = Motion(stroke, velocity, force)
-            warn_outside([sentence(type(law).__name__, range_use(law, motion))], stacklevel=4)
+            warn_outside([sentence(type(law).__name__, range_use(law, motion))])
 
 
 def _refuse_strokes(law: AbstractDamper, stroke: Signal) -> None:
@@ -289,4 +289,4 @@ def _refuse_method(method: "str | diffrax.AbstractSolver", engine: AbstractLawEn
     if engine is not None:
         _checks.refuse("engine", "be given without `method`", repr(engine))
     instead = "`engine=simulation.Adaptive(solver, rtol=..., atol=...)`, or leave it out for the steps of the laws"
-    warnings.warn(f"`method` of `respond` is deprecated: pass {instead}.", DeprecationWarning, stacklevel=3)
+    warn(f"`method` of `respond` is deprecated: pass {instead}.", DeprecationWarning)

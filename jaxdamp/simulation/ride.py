@@ -1,6 +1,7 @@
 """`Ride`: a vehicle on a road as one function of its parameters, the metrics gathered while it drives."""
 
 import copy
+import functools
 import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
@@ -16,6 +17,7 @@ from jaxdamp._field_types import check_module
 from jaxdamp._forked import refuse_fork
 from jaxdamp._jacobian import Mode
 from jaxdamp._many_points import outside_domains
+from jaxdamp._quickly import compiled_quickly
 from jaxdamp._traced import is_batched, look_behind
 from jaxdamp._types import Point, Scalar
 from jaxdamp._vectors import MemoryLayout
@@ -254,7 +256,7 @@ class Ride(eqx.Module):
                 _checks.refuse(f"point[{name!r}]", must, f"of shape {shape}", remedy)
 
 
-@eqx.filter_jit
+@functools.partial(compiled_quickly, small=lambda ride, point: isinstance(ride.road, WhiteRoad))
 def _drive(ride: Ride, point: dict[str, Array]) -> dict[str, Scalar]:
     """The metrics of the vehicle at a point."""
     vehicle = replace(ride.vehicle, point)

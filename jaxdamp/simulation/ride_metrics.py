@@ -9,6 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks, metrics
+from jaxdamp._quickly import compiled_quickly
 from jaxdamp._tables import Compared, Table, comparison_table, percent_change
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Scalar, ScalarLike, Signal
@@ -147,7 +148,7 @@ def _at_rest(run: "Response") -> tuple[Scalar, ...]:
     return run.remembered("at rest", lambda: _channels_at_rest(run.system, first))
 
 
-@eqx.filter_jit
+@compiled_quickly
 def _channels_at_rest(system: System, road: Float[ArrayLike, " wheels"]) -> tuple[Scalar, ...]:
     height = jnp.asarray(road)
     return tuple(system.outputs(settled(system, height), jnp.zeros(system.outputs.force.shape[1]), height, None))

@@ -1,7 +1,6 @@
 """`simulate`: a vehicle on a road."""
 
 import functools
-import warnings
 from collections.abc import Mapping
 from typing import Literal, Unpack, overload
 
@@ -15,6 +14,7 @@ from jaxdamp._field_types import check_field_types, check_module
 from jaxdamp._settings import with_defaults
 from jaxdamp._traced import at_compile_time, behind, is_traced
 from jaxdamp._types import Scalar, ScalarLike, Signal
+from jaxdamp._warned import warn
 from jaxdamp.dampers import coverage, warn_outside
 from jaxdamp.parameters import modules_inside
 from jaxdamp.roads import AbstractRoad
@@ -180,9 +180,7 @@ def _by_method(asked: SimulationSettings) -> AbstractEngine:
     if isinstance(method, str):
         _checks.one_of("method", method, ["exponential", "diffrax"])
     instead = "`engine=simulation.Adaptive(solver, rtol=..., atol=...)` or `engine=simulation.Exponential()`"
-    warnings.warn(
-        f"`method`, `rtol` and `atol` of `simulate` are deprecated: pass {instead}.", DeprecationWarning, stacklevel=3
-    )
+    warn(f"`method`, `rtol` and `atol` of `simulate` are deprecated: pass {instead}.", DeprecationWarning)
     if method is None or method == "exponential":
         return Exponential(substeps=asked["substeps"])
     solver = None if isinstance(method, str) else method

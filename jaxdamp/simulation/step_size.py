@@ -1,7 +1,5 @@
 """Whether a vehicle bears a step: it is divided, refused, or a warning states the estimated error."""
 
-import inspect
-import warnings
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from typing import NamedTuple
@@ -14,6 +12,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._traced import at_compile_time, is_batched, row, rows
+from jaxdamp._warned import warn
 from jaxdamp.simulation.stability import LARGEST, MOST, KnownCar, Need, known_cars, rounded_down, step_need
 from jaxdamp.simulation.step_error import StepError, step_error
 from jaxdamp.vehicles import System
@@ -27,7 +26,6 @@ STEEP = 0.25  # share of a velocity's error that comes back through the travel, 
 SAMPLES_PER_PERIOD = 3.0  # of a record of the road; the tyre of a real wheel smooths what lies between them
 SAMPLES = 32  # in a run, from which on a road of samples is taken for a record, and not for a few straight pieces
 WARNED, REFUSED = 0.01, 0.2  # estimated RMS of the error over the RMS of a channel
-INSIDE = ("jaxdamp", "equinox", "jax", "jaxtyping", "beartype", "contextlib")  # modules that no user wrote
 AIM = 0.005  # error to which the step that a warning names should lead
 
 
@@ -89,7 +87,7 @@ class RunCheck(NamedTuple):
         cars = known_cars(self.system, self.dt)
         if cars is None:
             if wanted is None:
-                _warn(_assumed(self.dt), TracedStepWarning)
+                warn(_assumed(self.dt), TracedStepWarning)
             return wanted or 1
         per_period = self._per_period(cars)
         needs = [step_need(*car, self.dt, most=MOST if wanted is None else np.inf) for car in cars]
@@ -107,7 +105,7 @@ class RunCheck(NamedTuple):
         cars = known_cars(self.system, self.dt)
         if cars is None:
             if self.dt > USUAL * (1 + 1e-9):
-                _warn(_unknown_vehicle(self.dt), TracedStepWarning)
+                warn(_unknown_vehicle(self.dt), TracedStepWarning)
             return
         per_period = self._per_period(cars)
         worst = int(np.argmin(per_period))
@@ -135,7 +133,7 @@ class RunCheck(NamedTuple):
         ride = self.system, self.heights, self.start
         with nullcontext() if is_batched(ride) else at_compile_time():
             if rows(ride) is None:
-                _warn(_unknown_road(self.dt), TracedStepWarning)
+                warn(_unknown_road(self.dt), TracedStepWarning)
                 return
             run = self.system, self.heights, self.half(), self.start
             runs = rows(run)
@@ -172,10 +170,11 @@ def _judge(estimate: StepError, dt: float) -> None:
             f"{dt:g} s, where that of `{estimate.channel}` is estimated at {said} by a comparison with half the step"
         )
         _checks.refuse("dt", must, value, f"Pass `dt={shorter:g}`.")
-    _warn(
+    warn(
         f"A step of dt = {dt:g} s is coarse for this vehicle on this road: the error of `{estimate.channel}` is "
         f"estimated at {100 * estimate.error:.2g} % of its RMS, by a comparison with half the step. "
-        f"`dt={shorter:g}` makes it less than 1 %."
+        f"`dt={shorter:g}` makes it less than 1 %.",
+        CoarseStepWarning,
     )
 
 
@@ -204,14 +203,6 @@ def _unknown_road(dt: float) -> str:
     )
 
 
-def _warn(text: str, kind: type[UserWarning] = CoarseStepWarning) -> None:
-    """Warn at the line outside this package that asked for the run."""
-    frame, level = inspect.currentframe(), 1
-    while frame is not None and frame.f_globals.get("__name__", "").split(".")[0] in INSIDE:
-        frame, level = frame.f_back, level + 1
-    warnings.warn(text, kind, stacklevel=level)
-
-
 def _refuse_unresolved(mode: FastestMode, dt: float) -> None:
     """Refuse instants too far apart for the fastest mode that follows the road."""
     longest = 1.0 / (LEAST_PER_PERIOD * mode.frequency)
@@ -233,11 +224,12 @@ def _warn_of_samples(mode: FastestMode, grid: float) -> None:
     if per_period >= SAMPLES_PER_PERIOD:
         return
     finer = rounded_down(1.0 / (LEAST_PER_PERIOD * mode.frequency))
-    _warn(
+    warn(
         f"The road's samples lie {grid:.4g} s apart, {per_period:.2g} to a period of the fastest mode that follows it "
         f"({mode.frequency:.4g} Hz, mostly `{mode.coordinate}`). It is straight between them, and its kinks shake this "
         f"mode whatever the step. Give it samples every {finer:g} s (a profile resampled by a smooth curve), or soften "
-        "what stands on the road (`tyre_stiffness`)."
+        "what stands on the road (`tyre_stiffness`).",
+        CoarseStepWarning,
     )
 
 

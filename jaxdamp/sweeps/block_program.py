@@ -2,7 +2,6 @@
 
 import functools
 import hashlib
-import warnings
 from collections.abc import Callable, Mapping
 from typing import final
 
@@ -12,6 +11,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Dataset
+from jaxdamp._warned import warn
 from jaxdamp.blocks import AbstractWork, Blocks, BlockStore, Cluster, Variable, block_size, fill
 from jaxdamp.sweeps.axes import PARAMETER, AbstractPoints, Grid, Points, as_points
 from jaxdamp.sweeps.function import Gradients, PointFunction
@@ -180,10 +180,9 @@ def sweep_into_store(
     data = program.dataset(store)
     failed = data.attrs["failed_points"]
     if failed:
-        warnings.warn(
+        warn(
             f"{failed} of {data.attrs['points_done']} points of the sweep failed: what is not finite there is NaN. "
-            "`data.failed` marks them, and `data.reason` says why.",
-            stacklevel=3,
+            "`data.failed` marks them, and `data.reason` says why."
         )
     return data
 

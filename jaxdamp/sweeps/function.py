@@ -3,7 +3,6 @@
 import functools
 import hashlib
 import re
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from difflib import get_close_matches
 from typing import NamedTuple, Protocol, final, runtime_checkable
@@ -17,6 +16,7 @@ from jaxtyping import Array, PyTree
 from jaxdamp import _checks
 from jaxdamp._jacobian import Mode, choose_mode, value_and_jacobian
 from jaxdamp._types import Scalar
+from jaxdamp._warned import warn
 from jaxdamp.sweeps.axes import PARAMETER, POINT
 
 
@@ -276,7 +276,7 @@ def _warn_of_unused(jaxpr: Jaxpr, axes: list[str]) -> None:
         message = (
             f"The function does not use the {plural} {_listed(idle)}: no result changes along it. Is the name right?"
         )
-        warnings.warn(message, stacklevel=4)
+        warn(message)
 
 
 def _loops_without_end(jaxpr: ClosedJaxpr | Jaxpr) -> bool:

@@ -11,6 +11,7 @@ from typing import final
 import jax
 import numpy as np
 
+from jaxdamp._warned import warn
 from jaxdamp.sweeps.axes import AbstractPoints, Points
 from jaxdamp.sweeps.function import (
     Gradients,
@@ -228,7 +229,7 @@ class Computation:
                 return prepare(printed_trace, count, self._chunk, self._devices, _lanes(printed))
         except NotImplementedError as error:
             if _of_machine(error):
-                warnings.warn(f"{error} This sweep goes on with the loop of XLA.", stacklevel=2)
+                warn(f"{error} This sweep goes on with the loop of XLA.")
             return None
 
     @property

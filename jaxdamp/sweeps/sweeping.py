@@ -3,7 +3,6 @@
 import json
 import os
 import time
-import warnings
 import zlib
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from pathlib import Path
@@ -17,6 +16,7 @@ from jaxdamp._progress import Progress, tell
 from jaxdamp._settings import with_defaults
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import DataArray, Dataset
+from jaxdamp._warned import warn
 from jaxdamp._writing import whole
 from jaxdamp.blocks import Cluster
 from jaxdamp.sweeps.axes import AbstractPoints, as_points
@@ -232,10 +232,9 @@ class SweepFile:
         for values in table.values.values():
             values[damaged] = np.nan
         table.done[damaged], table.reason[damaged] = False, 0
-        warnings.warn(
+        warn(
             f"{np.count_nonzero(damaged)} of {len(damaged)} points in {self.path} were damaged on the disk, and are "
-            "computed anew.",
-            stacklevel=5,
+            "computed anew."
         )
 
     def _differences(self, stored: Dataset) -> list[str]:
@@ -269,7 +268,7 @@ class SweepFile:
         try:
             self._write()
         except OSError as error:
-            warnings.warn(f"The sweep could not be written to {self.path}: {error}", stacklevel=4)
+            warn(f"The sweep could not be written to {self.path}: {error}")
         taken = time.monotonic() - start
         self._pause = max(INTERVAL, 20 * taken)
         self._next = time.monotonic() + self._pause

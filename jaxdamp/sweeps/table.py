@@ -1,13 +1,13 @@
 """The results of a sweep while it runs, point after point, and their labels."""
 
 import dataclasses
-import warnings
 from collections.abc import Mapping
 from typing import final
 
 import numpy as np
 
 from jaxdamp._types import Dataset
+from jaxdamp._warned import warn
 from jaxdamp.sweeps.axes import PARAMETER, AbstractPoints, Columns
 from jaxdamp.sweeps.function import Traced
 
@@ -108,11 +108,10 @@ class Table:
         by_count = sorted(range(1, len(self.reasons)), key=lambda i: -numbers[i])
         why = [f"{self.reasons[i]} ({numbers[i]})" for i in by_count[:MOST_REASONS]]
         why += ["and others"] * (len(by_count) > MOST_REASONS)
-        warnings.warn(
+        warn(
             f"{count} of {total} points of the sweep failed: what is not finite there is NaN. They lie at "
             f"{extent(columns)}. Why: {'; '.join(why)}. Look at them with `data.where(data.failed, drop=True)`, and at "
-            "`data.reason`.",
-            stacklevel=3,
+            "`data.reason`."
         )
 
 

@@ -1,5 +1,6 @@
 """What a tuning computes of a vehicle: metrics on one road or over scenarios, in one compiled program."""
 
+import functools
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple, final
@@ -13,8 +14,10 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._jacobian import Mode, value_and_jacobian
 from jaxdamp._one_thread import usable_cores
+from jaxdamp._quickly import compiled_quickly
 from jaxdamp._types import Scalar
 from jaxdamp.parameters import FreeParameters
+from jaxdamp.roads import WhiteRoad
 from jaxdamp.simulation import Ride, moves_axles
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.scenario_ride import ScenarioRide
@@ -24,6 +27,7 @@ from jaxdamp.tune.shape import ShapeNumbers
 from jaxdamp.vehicles import AbstractVehicle
 
 
+FEW = 64  # vehicles on white roads, up to which compiling takes most of the time of a search
 LANES = 16  # points side by side in one call of the compiled program
 FORWARD = 5  # parameters for each result, up to which forward derivatives of so many lanes are faster
 
@@ -113,7 +117,16 @@ class Measurement(eqx.Module):
         return eqx.tree_at(lambda measured: measured.ride, self, ride)
 
 
-@eqx.filter_jit
+def _is_small(
+    measured: Measurement, free: FreeParameters, values: Float[Array, "*lanes free"], *_: object, **__: object
+) -> bool:
+    """Whether these are few vehicles on white roads."""
+    ride = measured.ride
+    road = ride.roads if isinstance(ride, ScenarioRide) else ride.road
+    return isinstance(road, WhiteRoad) and values[..., 0].size * max(len(measured.scenario_names), 1) <= FEW
+
+
+@functools.partial(compiled_quickly, small=_is_small)
 def _values(measured: Measurement, free: FreeParameters, values: Float[Array, "*lanes free"]) -> Array:
     """All numbers, shape (*lanes, numbers), of vectors of values."""
 
@@ -124,7 +137,7 @@ def _values(measured: Measurement, free: FreeParameters, values: Float[Array, "*
     return one(values) if values.ndim == 1 else jax.vmap(one)(values)
 
 
-@eqx.filter_jit
+@functools.partial(compiled_quickly, small=_is_small)
 def _values_and_slopes(
     measured: Measurement, free: FreeParameters, values: Float[Array, "*lanes free"], of: tuple[str, ...], mode: Mode
 ) -> tuple[Array, Array]:

@@ -14,6 +14,7 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._jacobian import Mode
 from jaxdamp._limits import largest
+from jaxdamp._quickly import compiled_quickly
 from jaxdamp._types import Point, Scalar
 from jaxdamp.metrics import Metric, MetricValues
 from jaxdamp.parameters import checked, get, match_paths, modules_inside, replace, with_values
@@ -157,14 +158,11 @@ class ScenarioRide(eqx.Module):
         vehicle = replace(self.vehicle, point) if point else self.vehicle
         if point:
             self.refuse_moved_axles("point", lambda values: replace(self.vehicle, values), point)
-
-        def one(road: Array | WhiteRoad, factors: dict[str, Array], offsets: dict[str, Array]) -> dict[str, Scalar]:
-            changed = {path: factors[path] * get(vehicle, path) + offsets[path] for path in factors}
-            ride = self.ride.of_vehicle(with_values(vehicle, changed))
-            field = "road" if isinstance(self.roads, WhiteRoad) else "heights"
-            return dict(eqx.tree_at(lambda ride: getattr(ride, field), ride, road)())
-
-        by_name = jax.vmap(one)(self.roads, self.factors, self.offsets)
+        white = isinstance(self.roads, WhiteRoad)
+        by_name = _on_white_roads(self, vehicle) if white else _in_each(self, vehicle)
+        known = [number for value in by_name.values() if (number := _checks.concrete(value)) is not None]
+        if white and not all(np.all(np.isfinite(number)) for number in known):
+            by_name = _in_each(self, vehicle)  # which refuses laws that have no stationary motion
         return MetricValues.with_units({m.name: by_name[m.name] for m in self.metrics}, self.units)
 
     def refuse_moved_axles(self, argument: str, build: Callable[[T], AbstractVehicle], values: T) -> None:
@@ -179,6 +177,21 @@ class ScenarioRide(eqx.Module):
         """The metrics by name, one number for all scenarios."""
         values = {name: self.risk(each, self.weights) for name, each in self.each(point).items()}
         return MetricValues.with_units(values, self.units)
+
+
+def _in_each(scenarios: ScenarioRide, vehicle: AbstractVehicle) -> dict[str, Float[Array, " scenarios"]]:
+    """The metrics of a vehicle by name in every scenario."""
+
+    def one(road: Array | WhiteRoad, factors: dict[str, Array], offsets: dict[str, Array]) -> dict[str, Scalar]:
+        changed = {path: factors[path] * get(vehicle, path) + offsets[path] for path in factors}
+        ride = scenarios.ride.of_vehicle(with_values(vehicle, changed))
+        field = "road" if isinstance(road, WhiteRoad) else "heights"
+        return dict(eqx.tree_at(lambda ride: getattr(ride, field), ride, road)())
+
+    return jax.vmap(one)(scenarios.roads, scenarios.factors, scenarios.offsets)
+
+
+_on_white_roads = compiled_quickly(_in_each)
 
 
 def scenario_ride(

@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._jacobian import with_jacobian
+from jaxdamp._quickly import compiled_quickly
 from jaxdamp._settings import part, with_defaults
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Number, Scalar, ScalarLike, Vector
@@ -118,11 +119,12 @@ def sensitivity(
     point = np.array([*np.asarray(free.values, float), *given.values()])
     measured = _measured(hatted, road, list(given), objective, free, run)
     names = [name for name in objective.units(vehicle) if name in objective.names]
-    values, slopes = _derivatives(measured, names, point)
+    compiled = compiled_quickly if is_white(first) else eqx.filter_jit
+    values, slopes = _derivatives(measured, names, point, compiled)
     is_curve = np.array([is_hat(p.path, hatted) for p in free.owners] + [False] * len(given), bool)
     chosen = np.flatnonzero(~is_curve)
     units = [*(p.unit for p in of_vehicle.owners), *("m/s" if name == "speed" else "" for name in given)]
-    second = _second(measured, names, point, chosen) if second_order else None
+    second = _second(measured, names, point, chosen, compiled) if second_order else None
     return Sensitivity(
         values=dict(zip(names, values.tolist(), strict=True)),
         units={name: objective.units(vehicle)[name] for name in names},
@@ -239,18 +241,22 @@ def _measured(
     return measured
 
 
-def _derivatives(measured: MetricsOf, names: Sequence[str], point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _derivatives(
+    measured: MetricsOf, names: Sequence[str], point: np.ndarray, compiled: Callable[..., Callable]
+) -> tuple[np.ndarray, np.ndarray]:
     """The metrics, shape (names,), and their derivatives, shape (names, numbers)."""
 
     def stacked(x: jax.Array) -> jax.Array:
         results = measured(x)
         return jnp.stack([results[name] for name in names])
 
-    values, slopes = eqx.filter_jit(with_jacobian(stacked))(jnp.asarray(point))
+    values, slopes = compiled(with_jacobian(stacked))(jnp.asarray(point))
     return np.asarray(values, float), np.asarray(slopes, float)
 
 
-def _second(measured: MetricsOf, names: Sequence[str], point: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+def _second(
+    measured: MetricsOf, names: Sequence[str], point: np.ndarray, chosen: np.ndarray, compiled: Callable[..., Callable]
+) -> np.ndarray:
     """Second derivatives by some of the numbers, shape (names, chosen, chosen)."""
     start = jnp.asarray(point)
 
@@ -258,7 +264,7 @@ def _second(measured: MetricsOf, names: Sequence[str], point: np.ndarray, chosen
         results = measured(start.at[chosen].set(part))
         return jnp.stack([results[name] for name in names])
 
-    return np.asarray(eqx.filter_jit(jax.jacfwd(jax.jacfwd(stacked)))(start[chosen]), float)
+    return np.asarray(compiled(jax.jacfwd(jax.jacfwd(stacked)))(start[chosen]), float)
 
 
 def _curve_parts(

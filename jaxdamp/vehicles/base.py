@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._forked import refuse_fork
+from jaxdamp._quickly import compiled_quickly
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.metrics import Metric, current_name
@@ -165,7 +166,7 @@ def _layout_of(structure: object, leaves: tuple[object, ...]) -> Layout:
     return layouts[0]
 
 
-@eqx.filter_jit
+@compiled_quickly
 def _assembled(vehicle: AbstractVehicle) -> System:
     return assemble(vehicle.frame())
 

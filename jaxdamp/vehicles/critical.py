@@ -2,13 +2,13 @@
 
 from typing import NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp._field_types import check_module
 from jaxdamp._limits import root
+from jaxdamp._quickly import compiled_quickly
 from jaxdamp._types import Scalar
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.frame import STANDARD_GRAVITY, Frame
@@ -76,7 +76,7 @@ def _springs(frame: Frame) -> list[Scalar]:
     return [link.stiffness + jnp.sum(slopes[ends[i] : ends[i + 1]]) for i, link in enumerate(frame.links)]
 
 
-@eqx.filter_jit
+@compiled_quickly
 def _stiffness(ports: Ports, deflection: Float[Array, " ports"]) -> Float[Array, " ports"]:
     return ports.stiffness_and_damping(deflection)[0]
 

@@ -13,6 +13,7 @@ from jaxtyping import Array, ArrayLike, Bool, Float, PyTree
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._matrices import solve
+from jaxdamp._quickly import compiled_quickly
 from jaxdamp._root import ImplicitDerivatives
 from jaxdamp._sharded import varying_as
 from jaxdamp._types import Scalar
@@ -116,7 +117,7 @@ class _SharedNewton(optx.AbstractRootFinder):
         return y, aux, {}
 
 
-@eqx.filter_jit
+@compiled_quickly
 def _rest(vehicle: AbstractVehicle, road: Float[Array, " wheels"]) -> Float[Array, " q"]:
     return rest_position(vehicle.system(), road)
 

@@ -14,6 +14,7 @@ from jaxtyping import Array, ArrayLike, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._matrices import solve
+from jaxdamp._quickly import compiled_quickly
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp.dampers import coverage
 from jaxdamp.metrics import weighting_state_space
@@ -200,7 +201,7 @@ def _on_random_road(
     return linear
 
 
-@eqx.filter_jit
+@compiled_quickly
 def _linearise_statistically(
     vehicle: AbstractVehicle, velocity_psd: Array, delays: Float[Array, " wheels"]
 ) -> tuple[LinearVehicle, Scalar]:
@@ -216,7 +217,7 @@ def _linearise_statistically(
     return eqx.tree_at(lambda linear: linear.feed_through, linear, lost), found
 
 
-@eqx.filter_jit
+@compiled_quickly
 def _linearise(vehicle: AbstractVehicle, amplitude: Array | None, frequency: Array | None) -> LinearVehicle:
     refuse_controller(vehicle, "a linear vehicle")
     system = vehicle.system()

@@ -2,13 +2,13 @@
 
 from typing import NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._limits import at_least, root
+from jaxdamp._quickly import compiled_quickly
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.gaussian import channel_covariance
@@ -145,7 +145,7 @@ def _in_motion(
     return linearise(vehicle, velocity_psd=velocity_psd, speed=speed, in_phase=in_phase)
 
 
-@eqx.filter_jit
+@compiled_quickly
 def _covariance(
     linear: LinearVehicle, delays: Float[Array, " wheels"], chosen: tuple[int, ...]
 ) -> Float[Array, "channels channels"]:
