@@ -114,7 +114,7 @@ def sweep(
     Returns:
         The results by name with the axes as dimensions (for a list, along `point`). Of a `Ride`, `attrs["loop"]` says
         by what its loop was compiled at the end: XLA, or the C compiler where a long sweep found that to be faster; the
-        numbers are the same to rounding. From a `.zarr` store they are read when they are settings for, and
+        numbers are the same to rounding. From a `.zarr` store they are read when they are asked for, and
         `attrs["points_done"]` counts those that are done; each process chooses its loop, which is not noted. With
         `summary`, a `SweepSummary` of the points that are done.
 
