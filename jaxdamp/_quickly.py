@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar
+from typing import TypeVar, cast
 
 import equinox as eqx
 import jax
@@ -10,7 +10,7 @@ import jax
 from jaxdamp._traced import is_inside_program, is_traced
 
 
-P, R = ParamSpec("P"), TypeVar("R")
+Function = TypeVar("Function", bound=Callable[..., object])
 
 # Without optimisation, and by the quicker one of two code generators, of which later versions of JAX have one.
 OPTIONS: dict[str, int | bool] = {"xla_backend_optimization_level": 0}
@@ -18,7 +18,7 @@ if jax.__version_info__ < (0, 11):
     OPTIONS["xla_cpu_use_fusion_emitters"] = False
 
 
-def compiled_quickly(function: Callable[P, R], small: Callable[P, bool] = lambda *_, **__: True) -> Callable[P, R]:
+def compiled_quickly(function: Function, small: Callable[..., bool] = lambda *_, **__: True) -> Function:
     """`equinox.filter_jit` of a function; without optimisation where it is called by itself on a CPU.
 
     Inside a function that JAX compiles, differentiates or batches, it is a part of that one.
@@ -27,11 +27,12 @@ def compiled_quickly(function: Callable[P, R], small: Callable[P, bool] = lambda
         function: of the vehicle.
         small: whether its arguments are so few numbers that it runs for a shorter time than it compiles.
     """
-    part, alone = eqx.filter_jit(function), eqx.filter_jit(function, compiler_options=OPTIONS)
+    part = eqx.filter_jit(function)
+    alone = eqx.filter_jit(function, compiler_options=OPTIONS)  # pyright: ignore[reportCallIssue]
 
     @functools.wraps(function)
-    def call(*args: P.args, **kwargs: P.kwargs) -> R:
+    def call(*args: object, **kwargs: object) -> object:
         within = is_inside_program() or is_traced((args, kwargs)) or jax.default_backend() != "cpu"
         return (part if within or not small(*args, **kwargs) else alone)(*args, **kwargs)
 
-    return call
+    return cast(Function, call)

@@ -39,7 +39,8 @@ def test_only_what_is_small_and_called_by_itself_takes_the_options(monkeypatch: 
 
 
 def test_a_ride_on_a_white_road_is_one_function_in_a_loop_a_batch_and_a_program() -> None:
-    ride = Ride(vehicles.presets.quarter_car_000(dampers.Bilinear(2600.0, 1200.0)), roads.white("C", 20.0))
+    road = roads.white("C", 20.0)
+    ride = Ride(vehicles.presets.quarter_car_000(dampers.Bilinear(2600.0, 1200.0)), road)
     masses = np.array([1100.0, 1300.0])
     name = "rms_dynamic_tyre_load"
     alone = [ride({"sprung_mass": mass})[name] for mass in masses]
@@ -47,5 +48,5 @@ def test_a_ride_on_a_white_road_is_one_function_in_a_loop_a_batch_and_a_program(
     np.testing.assert_allclose(batch, alone, rtol=1e-9)
     np.testing.assert_allclose(jax.jit(lambda: ride({"sprung_mass": 1300.0})[name])(), alone[1], rtol=1e-9)
     conditions = {str(mass): tune.Condition({"sprung_mass": mass}) for mass in masses.tolist()}
-    each = tune.Scenarios([ride.road], conditions).ride(ride.vehicle, metrics=[name]).each()
+    each = tune.Scenarios([road], conditions).ride(ride.vehicle, metrics=[name]).each()
     np.testing.assert_allclose(each[name], alone, rtol=1e-9)
