@@ -25,7 +25,7 @@ WRONG: dict[str, Callable[[], object]] = {  # calls with a mistyped keyword, by 
     "shared": lambda: identify.fit(LAW, {"A": []}, shard=["friction"]),  # pyright: ignore[reportCallIssue]
     "loss": lambda: identify.fit_many(LAW, {"A": []}, los="huber"),  # pyright: ignore[reportCallIssue]
     "settling": lambda: identify.fit(CAR, [], setling=0.5),  # pyright: ignore[reportCallIssue]
-    "held_out": lambda: identify.compare({"linear": Linear}, [], heldout=[]),  # pyright: ignore[reportCallIssue]
+    "held_out": lambda: identify.compare({"linear": Linear}, [], heldout=[]),  # pyright: ignore
     "scatter": lambda: tune.robust("comfort", CAR, tune.Scenarios([roads.iso8608("C", 20.0, seed=1)]), scater={}),  # pyright: ignore[reportCallIssue]
     "per_record": lambda: identify.fit_vehicle(CAR, [], per_records=["offset"]),  # pyright: ignore[reportCallIssue]
     "bounds": lambda: identify.fit_targets(len, LAW, {}, bound={}),  # pyright: ignore
