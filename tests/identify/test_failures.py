@@ -54,6 +54,8 @@ def test_a_comparison_without_any_fit_says_why(sines):
         compare({"linear": Linear}, sines(TRUTH, noise=5.0), weighting="records")
     with pytest.raises(TypeError, match="did you mean 'weighting'"):
         compare({"linear": Linear}, sines(TRUTH, noise=5.0), wieghting="runs")  # pyright: ignore
+    with pytest.raises(ValueError, match=r"`scheduled` must be True with `common` or `blend`, but is False"):
+        compare({"linear": Linear}, sines(TRUTH, noise=5.0), common=["rate"])
 
 
 def test_a_start_that_cannot_be_made_is_a_failure_of_that_law(sines, monkeypatch):
