@@ -32,7 +32,7 @@ def compiled_quickly(function: Function, small: Callable[..., bool] = lambda *_,
 
     @functools.wraps(function)
     def call(*args: object, **kwargs: object) -> object:
-        within = is_inside_program() or is_traced((args, kwargs)) or jax.default_backend() != "cpu"
-        return (part if within or not small(*args, **kwargs) else alone)(*args, **kwargs)
+        by_itself = small(*args, **kwargs) and not is_inside_program() and not is_traced((args, kwargs))
+        return (alone if by_itself and jax.default_backend() == "cpu" else part)(*args, **kwargs)
 
     return cast(Function, call)

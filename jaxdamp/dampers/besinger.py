@@ -1,7 +1,6 @@
 """The seven-parameter law of Besinger, Cebon and Cole, as paper 001 uses it for a heavy vehicle."""
 
 import dataclasses
-import warnings
 from collections.abc import Sequence
 from typing import final
 
@@ -10,6 +9,7 @@ import numpy as np
 from jaxdamp._elementary import algebraic_sigmoid
 from jaxdamp._limits import at_most
 from jaxdamp._types import Number, Scalar, ScalarLike
+from jaxdamp._warned import warn
 from jaxdamp.dampers._guesses import secant_rate
 from jaxdamp.dampers.base import AbstractMemoryless, Condition, Reach
 from jaxdamp.dampers.degressive import plainer_curve
@@ -123,11 +123,10 @@ class Besinger(AbstractMemoryless):
         below = float(law.force_velocity(v_lim))
         jump = above - below
         if abs(jump) > 1e-6 * abs(below):
-            warnings.warn(
+            warn(
                 f"The printed formula with v_open = {v_open:g} m/s jumps by {jump:+.4g} N ({100 * jump / below:+.2g} %)"
                 f" at v_lim = {v_lim:g} m/s; continuity needs v_open = {float(law.opening_velocity()):.6g} m/s, which"
-                " is used instead, because a jump causes errors in solvers and gradients.",
-                stacklevel=2,
+                " is used instead, because a jump causes errors in solvers and gradients."
             )
         return law
 

@@ -2,7 +2,6 @@
 
 import dataclasses
 import functools
-import warnings
 from collections.abc import Callable, Iterable, Sequence
 from typing import overload
 
@@ -13,6 +12,7 @@ from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
 from jaxdamp._tables import Contents, Table, plain, with_unit
 from jaxdamp._types import Figure, VectorLike
+from jaxdamp._warned import warn
 from jaxdamp.bench import BenchRun, as_runs, initial_temperature
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.estimates import parameter_table
@@ -95,7 +95,7 @@ class AbstractFitted(AbstractResult):
     def predict(self, runs: BenchRun | Iterable[BenchRun]) -> list[np.ndarray]:
         """Deprecated: `respond` gives the same, without a list for one record."""
         text = "`predict` is deprecated: `respond(run)` gives the force of one record, `respond(runs)` a list."
-        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        warn(text, DeprecationWarning)
         return self.respond(as_runs(runs))
 
     def score(self, runs: BenchRun | Iterable[BenchRun]) -> tuple[float, float, tuple[Score, ...]]:

@@ -1,7 +1,6 @@
 """The result of a fit of a vehicle."""
 
 import dataclasses
-import warnings
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -11,6 +10,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp._results import Derived, drawn_by
 from jaxdamp._tables import Column, Contents, Table, with_unit
+from jaxdamp._warned import warn
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.estimates import parameter_table
 from jaxdamp.identify.model import VehicleTest
@@ -139,7 +139,7 @@ class VehicleFit(Fit):
     def predict(self) -> dict[str, dict[str, Float[np.ndarray, " time"]]]:
         """Deprecated: `respond(record)` gives the channels of one record."""
         text = "`predict()` of a fitted vehicle is deprecated: write `respond(record)` for one record."
-        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        warn(text, DeprecationWarning)
         return {record.name: self.respond(record) for record in self.records}
 
     def table(

@@ -15,6 +15,7 @@ from jaxdamp._display import display
 from jaxdamp._second_process import elsewhere
 from jaxdamp._tables import Table
 from jaxdamp._types import Figure
+from jaxdamp._warned import warn
 from jaxdamp._words import first_upper, said
 from jaxdamp.report.drawing import Drawn, drawn
 from jaxdamp.report.skeleton import SKELETON
@@ -211,7 +212,7 @@ class Report:
 
         def image(picture: Drawn) -> str:
             for text in picture.warnings:
-                warnings.warn(text, UserWarning, stacklevel=2)
+                warn(text, UserWarning)
             self._write(name, picture.png)
             if pdf:
                 self._write(pdf, picture.pdf)

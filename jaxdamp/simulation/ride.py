@@ -2,7 +2,6 @@
 
 import copy
 import functools
-import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from typing import final
@@ -21,6 +20,7 @@ from jaxdamp._quickly import compiled_quickly
 from jaxdamp._traced import is_batched, look_behind
 from jaxdamp._types import Point, Scalar
 from jaxdamp._vectors import MemoryLayout
+from jaxdamp._warned import warn
 from jaxdamp.codegen import compiler
 from jaxdamp.configuration import one_at_a_time, target
 from jaxdamp.dampers import RangeUse, has_fitted_range
@@ -173,7 +173,7 @@ class Ride(eqx.Module):
 
     def on_axles_of(self, vehicle: AbstractVehicle) -> "Ride":
         """Deprecated: `of_vehicle` does the same."""
-        warnings.warn("`Ride.on_axles_of` is deprecated: use `of_vehicle`.", DeprecationWarning, stacklevel=2)
+        warn("`Ride.on_axles_of` is deprecated: use `of_vehicle`.", DeprecationWarning)
         return self.of_vehicle(vehicle)
 
     def side_by_side(self) -> "Ride":

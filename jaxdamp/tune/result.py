@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import warnings
 from collections.abc import Sequence
 from typing import Generic, NamedTuple, TypeVar
 
@@ -15,6 +14,7 @@ from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, typeset_unit, with_unit
 from jaxdamp._types import Figure
+from jaxdamp._warned import warn
 from jaxdamp.tune.combinations import Combinations
 from jaxdamp.tune.limits import LimitRange, written
 from jaxdamp.tune.objective import Objective, Targets
@@ -193,7 +193,7 @@ class TuneResult(AbstractResult, Generic[V]):
     def tuning(self) -> "TuneResult[V]":
         """Deprecated: the result of `robust` is that of `minimise` with `tolerances`."""
         text = "`tuning` is deprecated: the result of `robust` is itself a tuning."
-        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        warn(text, DeprecationWarning)
         return self
 
     def table(self) -> Table:

@@ -1,6 +1,7 @@
 """The ride metrics of a vehicle in all scenarios, driven side by side, and how they become one number."""
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, TypeAlias, TypeVar, final
 
@@ -161,8 +162,9 @@ class ScenarioRide(eqx.Module):
         white = isinstance(self.roads, WhiteRoad)
         by_name = _on_white_roads(self, vehicle) if white else _in_each(self, vehicle)
         known = [number for value in by_name.values() if (number := _checks.concrete(value)) is not None]
-        if white and not all(np.all(np.isfinite(number)) for number in known):
-            by_name = _in_each(self, vehicle)  # which refuses laws that have no stationary motion
+        lost = np.flatnonzero(~np.any(np.isfinite(known), axis=0)) if white and known else ()
+        if len(lost) and np.ndim(known[0]) == 1:  # the ride by itself refuses laws without a stationary motion
+            _in_one(self, vehicle, *jax.tree.map(lambda leaf: leaf[lost[0]], (self.roads, self.factors, self.offsets)))
         return MetricValues.with_units({m.name: by_name[m.name] for m in self.metrics}, self.units)
 
     def refuse_moved_axles(self, argument: str, build: Callable[[T], AbstractVehicle], values: T) -> None:
@@ -179,15 +181,23 @@ class ScenarioRide(eqx.Module):
         return MetricValues.with_units(values, self.units)
 
 
+def _in_one(
+    scenarios: ScenarioRide,
+    vehicle: AbstractVehicle,
+    road: Array | WhiteRoad,
+    factors: dict[str, Array],
+    offsets: dict[str, Array],
+) -> dict[str, Scalar]:
+    """The metrics of a vehicle by name in one scenario."""
+    changed = {path: factors[path] * get(vehicle, path) + offsets[path] for path in factors}
+    ride = scenarios.ride.of_vehicle(with_values(vehicle, changed))
+    field = "road" if isinstance(road, WhiteRoad) else "heights"
+    return dict(eqx.tree_at(lambda ride: getattr(ride, field), ride, road)())
+
+
 def _in_each(scenarios: ScenarioRide, vehicle: AbstractVehicle) -> dict[str, Float[Array, " scenarios"]]:
     """The metrics of a vehicle by name in every scenario."""
-
-    def one(road: Array | WhiteRoad, factors: dict[str, Array], offsets: dict[str, Array]) -> dict[str, Scalar]:
-        changed = {path: factors[path] * get(vehicle, path) + offsets[path] for path in factors}
-        ride = scenarios.ride.of_vehicle(with_values(vehicle, changed))
-        field = "road" if isinstance(road, WhiteRoad) else "heights"
-        return dict(eqx.tree_at(lambda ride: getattr(ride, field), ride, road)())
-
+    one = functools.partial(_in_one, scenarios, vehicle)
     return jax.vmap(one)(scenarios.roads, scenarios.factors, scenarios.offsets)
 
 

@@ -19,6 +19,7 @@ DRIVEN = {"C": roads.iso8608("C", 20.0, seed=1), "bump": roads.cosine_bump(0.05,
 HOT = tune.Condition({"temperature": 350.0, "sprung_mass": 1500.0}, {"damper.**_rate": 0.8}, weight=3.0)
 WHITE = {"C": roads.white("C", 20.0), "D": roads.white("D", 10.0)}
 LINEAR = vehicles.presets.quarter_car_000()
+WILD = vehicles.presets.quarter_car_000(dampers.Polynomial([0.0, 2000.0, 0.0, -5000.0]))
 
 
 def test_each_scenario_is_the_ride_of_that_vehicle_on_that_road() -> None:
@@ -127,6 +128,7 @@ WRONG_SCENARIOS = [
     (lambda: tune.knee(0.1, side="up"), "`side` must be one of 'rebound', 'compression'"),
     (lambda: tune.Targets({}), "one or more metrics to a value and a tolerance"),
     (lambda: tune.minimise(Metric(ACCELERATION, "rms"), LINEAR, WHITE["C"]), "channel of metric"),
+    (lambda: tune.Scenarios(WHITE).ride(WILD).each(), "have a stationary motion .* none was found: damper"),
 ]
 
 
