@@ -162,8 +162,8 @@ class ScenarioRide(eqx.Module):
         white = isinstance(self.roads, WhiteRoad)
         by_name = _on_white_roads(self, vehicle) if white else _in_each(self, vehicle)
         known = [number for value in by_name.values() if (number := _checks.concrete(value)) is not None]
-        lost = np.flatnonzero(~np.any(np.isfinite(known), axis=0)) if white and known else ()
-        if len(lost) and np.ndim(known[0]) == 1:  # the ride by itself refuses laws without a stationary motion
+        lost = np.flatnonzero(~np.any(np.isfinite(known), axis=0)) if white and known else np.zeros(0, int)
+        if lost.size and np.ndim(known[0]) == 1:  # the ride by itself refuses laws without a stationary motion
             _in_one(self, vehicle, *jax.tree.map(lambda leaf: leaf[lost[0]], (self.roads, self.factors, self.offsets)))
         return MetricValues.with_units({m.name: by_name[m.name] for m in self.metrics}, self.units)
 
