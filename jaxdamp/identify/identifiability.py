@@ -4,14 +4,16 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from jaxdamp._display import plus_minus
 from jaxdamp.bench import BenchRun
+from jaxdamp.dampers import AbstractDamper, laws_inside
 from jaxdamp.identify.estimates import Estimate
-from jaxdamp.identify.model import STARTS
+from jaxdamp.identify.model import STARTS, Model, law_of, rig_of
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
+from jaxdamp.identify.stated import charged_apart, gas_charges
 from jaxdamp.identify.traces import Batch
 
 
@@ -19,7 +21,8 @@ MOST = 0.95  # part of the squared effect on the force that counts as all of it
 RARE = 0.15  # share of the samples that show an effect below which this is the reason
 FAST, SLOW = 0.8, 0.25  # of the largest velocity: above, or below, which an effect is one of fast or slow motion
 SPREAD = 0.8  # share of the velocities of the records that counts as all of them
-ALIKE = 0.1  # relative difference below which frequencies or amplitudes of records count as one
+ALIKE = 0.98  # correlation of two numbers, from which the records hardly tell them apart
+SAME = 0.1  # relative difference below which frequencies or amplitudes of records count as one
 NEEDLESS = "the curve hardly bends there", "Take one with fewer knots."
 
 
@@ -151,7 +154,7 @@ def _together(problem: Problem, estimates: Sequence[Estimate], members: set[int]
     lacking = [
         f"another {what}"
         for what, values in (("frequency", [r.frequency for r in runs]), ("stroke", [r.amplitude for r in runs]))
-        if runs and max(values) - min(values) < ALIKE * max(values)
+        if runs and max(values) - min(values) < SAME * max(values)
     ]
     tests = f"records of {_listed(lacking)}" if lacking else "records"
     tests += " (`identify.design_experiment` proposes tests)" * bool(runs and not lacking)
@@ -164,3 +167,45 @@ def _together(problem: Problem, estimates: Sequence[Estimate], members: set[int]
 
 def _listed(names: Sequence[str], word: str = "and") -> str:
     return f" {word} ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+
+
+def gas_in_words(
+    model: Model,
+    runs: Sequence[BenchRun],
+    estimates: Sequence[Estimate],
+    covariance: Float[np.ndarray, "free free"],
+) -> list[str]:
+    """A sentence on numbers of the gas force that the records hardly tell apart, since they are at one pressure.
+
+    Arguments:
+        model: the fitted law, on its machine if there is one.
+        runs: the fitted records.
+        estimates: of the free numbers.
+        covariance: of the same.
+    """
+    law, inside = law_of(model), "" if isinstance(model, AbstractDamper) else "law."
+    gas = tuple(inside + prefix for prefix, _ in gas_charges(law))
+    if not gas or charged_apart(law, runs):
+        return []
+    constant = [f"{inside}{prefix}{name}" for prefix, part in laws_inside(law) for name in part.constant_forces()]
+    constant += ["rig.force_offset", "rig.gas_force"] * (rig_of(model) is not None)
+    names = [e.name for e in estimates]
+    of_gas = np.array([name.startswith(gas) for name in names], bool)
+    beside = of_gas | np.isin(names, constant)
+    mixed = np.any(_alike(covariance) & np.outer(beside, beside) & (of_gas[:, None] | of_gas), axis=0)
+    if not mixed.any():
+        return []
+    pressures = [name.removeprefix(inside) for name in names if name.startswith(gas) and name.endswith("pressure")]
+    return [
+        f"These records, at one gas pressure, hardly tell {', '.join(np.array(names)[mixed])} apart: the gas pushes"
+        f" with pressure times area. Freeze what is known, or add records at other pressures that state them,"
+        f' `settings={{"{(*pressures, "pressure")[0]}": "20 bar"}}` (absolute).'
+    ]
+
+
+def _alike(covariance: Float[np.ndarray, "free free"]) -> Bool[np.ndarray, "free free"]:
+    """Which numbers are hardly told from which others."""
+    error = np.sqrt(np.diag(covariance))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        alike = np.abs(covariance / np.outer(error, error)) > ALIKE
+    return alike & ~np.eye(len(error), dtype=bool)

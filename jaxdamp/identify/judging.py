@@ -25,7 +25,7 @@ from jaxdamp.identify.blending import off_span
 from jaxdamp.identify.contradicting import contradicting
 from jaxdamp.identify.estimates import Estimate
 from jaxdamp.identify.estimating import Estimates, estimate, on_misfit
-from jaxdamp.identify.gas import gas_in_words
+from jaxdamp.identify.identifiability import gas_in_words
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.left_out import left_out
 from jaxdamp.identify.model import (

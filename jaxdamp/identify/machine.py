@@ -14,13 +14,13 @@ from jaxdamp._field_types import check_module
 from jaxdamp._types import Scalar
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, laws_inside
-from jaxdamp.identify.gas import charged_apart
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.model import law_of, on_rig, rig_of, starts_in
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution
 from jaxdamp.identify.starting import AbstractTrainedStart, Start, started
+from jaxdamp.identify.stated import charged_apart
 from jaxdamp.parameters import get, matching, parameters, real, with_values
 from jaxdamp.rig import Rig
 

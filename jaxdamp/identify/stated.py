@@ -7,6 +7,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun, initial_temperature, number_and_unit, ratio, refuse_misspelt
 from jaxdamp.dampers import (
+    AbstractDamper,
     Scheduled,
     check_commands,
     command_paths,
@@ -134,6 +135,28 @@ def start_paths(model: Model) -> list[str]:
     """Paths of the parameters that say only how warm a record begins, of laws and machines that warm up themselves."""
     known = {p.path for p in parameters(model)}
     return [path for path in at_start(model, 293.15) if path in known]
+
+
+def gas_charges(law: AbstractDamper) -> list[tuple[str, AbstractDamper]]:
+    """The laws inside whose static force has a meaning of its own, such as a gas charge, with prefixes of their paths.
+
+    Arguments:
+        law: the damper law.
+    """
+    parts = [(prefix, part) for prefix, part in laws_inside(law) if not part.inner_laws()]
+    return [(prefix, part) for prefix, part in parts if part.traits().contains_offset and not part.constant_forces()]
+
+
+def charged_apart(law: AbstractDamper, runs: Sequence[BenchRun]) -> bool:
+    """Whether the records state several values of a gas charge, so that a constant force is told from it.
+
+    Arguments:
+        law: the damper law.
+        runs: the records.
+    """
+    prefixes = tuple(prefix for prefix, _ in gas_charges(law))
+    stated = stated_parameters(law, runs).items() if prefixes else ()
+    return any(np.ptp(values) > 0.0 for path, values in stated if path.startswith(prefixes))
 
 
 def _vary(runs: Sequence[BenchRun]) -> bool:

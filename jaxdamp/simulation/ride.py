@@ -33,7 +33,12 @@ from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.notes import range_uses
 from jaxdamp.simulation.observer import MetricObserver, recorded
 from jaxdamp.simulation.run import refuse_stacked, run_check, sampled
-from jaxdamp.simulation.stationary import in_motion, stationary_dampers, stationary_metrics, stationary_range_use
+from jaxdamp.simulation.stationary import (
+    refuse_without_stationary_motion,
+    stationary_dampers,
+    stationary_metrics,
+    stationary_range_use,
+)
 from jaxdamp.simulation.wheels import delays_by_itself, heights_under_wheels, moves_axles
 from jaxdamp.vehicles import AbstractVehicle, EquivalentDamper, is_stationary, refuse_controller
 
@@ -243,7 +248,7 @@ class Ride(eqx.Module):
             values = _drive(ride, point)
         known = [number for value in values.values() if (number := _checks.concrete(value)) is not None]
         if isinstance(self.road, WhiteRoad) and not all(np.all(np.isfinite(number)) for number in known):
-            in_motion(replace(self.vehicle, point), self.road)  # which refuses laws that have no stationary motion
+            refuse_without_stationary_motion(replace(self.vehicle, point), self.road)
         return MetricValues.with_units(values, self.units)
 
     def _check_shape(self, name: str, shape: tuple[int, ...]) -> None:

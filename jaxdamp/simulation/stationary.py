@@ -13,7 +13,6 @@ from jaxdamp.simulation.notes import named_laws
 from jaxdamp.vehicles import (
     AbstractVehicle,
     EquivalentDamper,
-    LinearVehicle,
     equivalent_dampers,
     linearise,
     nonlinear_variables,
@@ -32,7 +31,8 @@ _POINTS = 2001
 
 def stationary_metrics(vehicle: AbstractVehicle, road: WhiteRoad, metrics: Sequence[Metric]) -> dict[str, Scalar]:
     """Metrics that follow from the RMS of their channels, with linear laws equivalent to the vehicle's."""
-    linear, wanted = in_motion(vehicle, road), dict[str, list[str]]()
+    linear = linearise(vehicle, velocity_psd=road.velocity_psd, speed=road.speed)
+    wanted: dict[str, list[str]] = {}
     for m in metrics:
         if m.weighting is not None:
             wanted.setdefault(m.weighting, []).append(m.channel)
@@ -50,13 +50,9 @@ def stationary_metrics(vehicle: AbstractVehicle, road: WhiteRoad, metrics: Seque
     return values
 
 
-def in_motion(vehicle: AbstractVehicle, road: WhiteRoad) -> LinearVehicle:
-    """The vehicle with linear laws equivalent to its own in its stationary motion on the road.
-
-    Raises:
-        ValueError: none was found.
-    """
-    return linearise(vehicle, velocity_psd=road.velocity_psd, speed=road.speed)
+def refuse_without_stationary_motion(vehicle: AbstractVehicle, road: WhiteRoad) -> None:
+    """Refuse a vehicle of which none was found, or that does not come to rest: all its metrics are infinite."""
+    stationary_rms(vehicle, road.velocity_psd, speed=road.speed)
 
 
 def stationary_dampers(vehicle: AbstractVehicle, road: WhiteRoad) -> dict[str, EquivalentDamper]:

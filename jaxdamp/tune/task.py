@@ -159,7 +159,8 @@ class DesignTask(Generic[V]):
         wrong = {name: x for name, x in before.items() if name not in exact and not np.isfinite(x)}
         if wrong:
             name, value = next(iter(wrong.items()))
-            remedy = "Call `simulate` with this road; its error messages explain the cause."
+            call = "Ride(vehicle, road)()" if is_white(self.road) else "simulate(vehicle, road)"
+            remedy = f"Call `{call}`; its error message explains the cause."
             _checks.refuse("vehicle", "have finite metrics to start from", f"{name} = {value}", remedy)
         of_metrics = []
         for name, allowed in self.allowed.items():

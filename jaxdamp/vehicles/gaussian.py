@@ -5,7 +5,7 @@ import functools
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from jaxdamp._limits import at_least
 from jaxdamp._matrices import phi_functions, solve
@@ -14,10 +14,13 @@ from jaxdamp._random import sobol_points
 
 _TERMS = 14  # of series of which each term is at most half as large as the one before: their rest is below 1e-16
 _DOUBLINGS = 51  # of the first interval, until nothing is left of the start
+_SETTLED = 1e-6  # part of an integral that the second half of its interval may add
 
 
-def lyapunov(a: Float[Array, "n n"], q: Float[Array, "n n"]) -> Float[Array, "n n"]:
+def lyapunov(a: Float[Array, "n n"], q: Float[Array, "n n"]) -> tuple[Float[Array, "n n"], Bool[Array, ""]]:
     """The solution P = ∫ e^{At} Q e^{Aᵀt} dt of A P + P Aᵀ + Q = 0 for a stable A, by doubling of the interval.
+
+    The second value is whether the integral has an end: for an A that is not stable it still grows in the last step.
 
     Over a short interval h both P(h) = ∫ e^{As} Q e^{Aᵀs} ds and F(h) = e^{Ah} are Taylor series; then
     P(2h) = P(h) + F P(h) Fᵀ and F(2h) = F(h)². F is stored as E = F − 1, which is small at first: F itself would lose
@@ -33,13 +36,14 @@ def lyapunov(a: Float[Array, "n n"], q: Float[Array, "n n"]) -> Float[Array, "n 
 
     (p, change), _ = jax.lax.scan(nest, (q, short), jnp.arange(_TERMS, 1.0, -1.0, dtype=a.dtype))
 
-    def double(now: tuple[Array, Array], _: None) -> tuple[tuple[Array, Array], None]:
-        p, e = now
+    def double(now: tuple[Array, Array, Array], _: None) -> tuple[tuple[Array, Array, Array], None]:
+        p, e, _ = now
         moved = p + e @ p
-        return (p + moved + moved @ e.T, 2.0 * e + e @ e), None
+        return (p + moved + moved @ e.T, 2.0 * e + e @ e, p), None
 
-    (found, _), _ = jax.lax.scan(double, (first * p, change), None, length=_DOUBLINGS)
-    return found
+    p = first * p
+    (p, _, before), _ = jax.lax.scan(double, (p, change, p), None, length=_DOUBLINGS)
+    return p, jnp.max(jnp.abs(p - before)) <= _SETTLED * jnp.max(jnp.abs(p))
 
 
 def channel_covariance(
@@ -48,12 +52,12 @@ def channel_covariance(
     pushes: Float[Array, "n wheels"],
     static: Float[Array, "channels wheels"],
     delays: Float[Array, " wheels"],
-) -> Float[Array, "channels channels"]:
+) -> tuple[Float[Array, "channels channels"], Bool[Array, ""]]:
     """∫ k kᵀ ds of the channels C ξ + D z_r, ξ̇ = A ξ + e ż_r: their covariance for a road rate of density one.
 
     k(s) is the response to an impulse of the road rate, the same road under one wheel after the other. While no wheel
     meets it, k is C times the matrix exponential of the state, plus a constant. The part after the last wheel follows
-    from A X + X Aᵀ + x xᵀ = 0.
+    from A X + X Aᵀ + x xᵀ = 0. The second value is whether the motion comes to an end, without which there is none.
 
     Arguments:
         a: A, stable.
@@ -69,13 +73,14 @@ def channel_covariance(
         gap = times[i] - times[i - 1]
         after = phi_functions(a * gap)[0] @ state
         # ∫ ξξᵀ over the interval: the integral from its start minus that from its end
-        covariance = lyapunov(a, jnp.outer(state, state) - jnp.outer(after, after))
+        covariance, _ = lyapunov(a, jnp.outer(state, state) - jnp.outer(after, after))
         mean = c @ solve(a, after - state)
         offset = -jnp.sum(static[:, i:], axis=1)  # later wheels are still on the road before the impulse
         cross = jnp.outer(offset, mean)
         total = total + c @ covariance @ c.T + cross + cross.T + jnp.outer(offset, offset) * gap
         state = after + pushes[:, i]
-    return total + c @ lyapunov(a, jnp.outer(state, state)) @ c.T
+    covariance, ends = lyapunov(a, jnp.outer(state, state))
+    return total + c @ covariance @ c.T, ends
 
 
 _REACH = 7.0  # standard deviations

@@ -66,6 +66,9 @@ def stationary_rms(
         remedy = (
             "Friction models such as Dahl, LuGre and Bouc-Wen have an undamped state for small motion: pass the "
             "vehicle itself, or `linearise(vehicle, velocity_psd=...)`."
+            if isinstance(vehicle, LinearVehicle)
+            else "One of its motions is not damped: `vehicles.modes(vehicle)` shows which. A damper with a negative "
+            "slope, for instance, feeds energy in."
         )
         _checks.refuse("vehicle", "come to rest when linearised", "one that does not", remedy)
     everything = tuple(range(len(linear.channels)))
@@ -149,8 +152,9 @@ def _in_motion(
 def _covariance(
     linear: LinearVehicle, delays: Float[Array, " wheels"], chosen: tuple[int, ...]
 ) -> Float[Array, "channels channels"]:
-    """∫ k kᵀ ds of some channels."""
+    """∫ k kᵀ ds of some channels; infinite for a vehicle that does not come to rest."""
     c, settled = linear.output[np.array(chosen)], linear.settled()
     # ξ = x − settled z_r obeys ξ̇ = A ξ + (E − settled) ż_r; channels are C ξ + (C settled + D) z_r + F ż_r
     static = c @ settled + linear.road_feed[np.array(chosen)]
-    return channel_covariance(linear.state_matrix, c, linear.road_rate_input - settled, static, delays)
+    covariance, ends = channel_covariance(linear.state_matrix, c, linear.road_rate_input - settled, static, delays)
+    return jnp.where(ends, covariance, jnp.inf)

@@ -295,7 +295,7 @@ def _distributions(
     settled = -solve(linear.a, jnp.concatenate([linear.b, linear.constant[:, None]], axis=1))
     settled, rest = settled[:, :-1], settled[:, -1]
     static = moved.state @ settled + moved.road
-    covariance = psd * channel_covariance(linear.a, moved.state, linear.e - settled, static, delays)
+    covariance = psd * channel_covariance(linear.a, moved.state, linear.e - settled, static, delays)[0]
     means, spreads = moved.state @ rest, []
     for kind in kinds:
         chosen, size = _chosen(kind), len(kind.curved)

@@ -79,10 +79,18 @@ def test_lyapunov_solution_is_that_of_scipy(rng):
     q = rng.normal(size=(6, 3))
     q = q @ q.T
     expected = scipy.linalg.solve_continuous_lyapunov(a, -q)
-    np.testing.assert_allclose(lyapunov(jnp.asarray(a), jnp.asarray(q)), expected, rtol=1e-9, atol=1e-12)
+    found, ends = lyapunov(jnp.asarray(a), jnp.asarray(q))
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
     rates = np.logspace(-6, 5, 6)  # slow and fast motions side by side: in P, q over the sum of their rates
-    found = lyapunov(jnp.asarray(np.diag(-rates)), jnp.asarray(q))
+    found, ends_slowly = lyapunov(jnp.asarray(np.diag(-rates)), jnp.asarray(q))
     np.testing.assert_allclose(found, q / (rates[:, None] + rates), rtol=1e-9)
+    assert ends and ends_slowly
+    undamped, unexcited = jnp.array([[0.0, 1.0], [-4.0, 0.0]]), jnp.array([[-1.0, 0.0], [0.0, 0.0]])
+    assert [bool(lyapunov(a, jnp.diag(jnp.array([1.0, 0.0])))[1]) for a in (undamped, -unexcited, unexcited)] == [
+        False,
+        False,
+        True,
+    ]
 
 
 def test_states_of_a_law_take_part():
