@@ -49,7 +49,6 @@ from jaxdamp.identify.scheduling import LeftOutSetting as LeftOutSetting, Schedu
 from jaxdamp.identify.settings import (
     FitSettings,
     Free as Free,
-    ManySettings as ManySettings,
     Records as Records,
     Search as Search,
     TargetSettings as TargetSettings,

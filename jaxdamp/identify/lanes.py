@@ -30,11 +30,13 @@ class Lanes(NamedTuple):
     searches: Sequence[Searches]
     used: Sequence[Bool[np.ndarray, " samples"]]  # which samples of each damper count
     damper: Int[np.ndarray, " lanes"]  # the damper of each lane
+    force_noise: float | None = None  # N, where it is known
 
     @classmethod
-    def of(cls, problems: Sequence[Problem]) -> "Lanes":
+    def of(cls, problems: Sequence[Problem], force_noise: float | None = None) -> "Lanes":
         """A lane for each damper."""
-        return cls(problems, searches_of(problems), [p.used for p in problems], np.arange(len(problems)))
+        used = [p.used for p in problems]
+        return cls(problems, searches_of(problems), used, np.arange(len(problems)), force_noise)
 
     def linearise(
         self, y: Float[np.ndarray, "some free"], lanes: Int[np.ndarray, " some"]
@@ -54,17 +56,21 @@ class Lanes(NamedTuple):
         return [signal[place][used[place]] for place in self.problems[damper].places]
 
     def noise(self, damper: int, residual: Float[np.ndarray, " samples"], free: float | int) -> float:
-        """Standard deviation of the weighted residual of a damper, larger where it is correlated.
+        """Standard deviation of the weighted residual of a damper, larger where it is correlated unless it is known.
 
         Arguments:
             damper: its number.
             residual: weighted.
             free: count of free numbers.
         """
+        problem, used = self.problems[damper], self.used[damper]
+        if self.force_noise is not None:
+            weights = self.force_noise / np.array(problem.sigma)[problem.owner[used]]
+            return float(np.sqrt(np.mean(weights**2)))
         parts = self.of_records(damper, residual)
         squares = sum(float(part @ part) for part in parts) / max(sum(part.size for part in parts) - free, 1)
         alike = correlation_time(parts)
-        return self.problems[damper].noise_factor * float(np.sqrt(squares * (alike if alike > CORRELATED else 1.0)))
+        return problem.noise_factor * float(np.sqrt(squares * (alike if alike > CORRELATED else 1.0)))
 
 
 def by_rounds(
@@ -93,7 +99,7 @@ def by_rounds(
             moving[i], rounds[i] = after is not None, after or rounds[i]
         if not np.any(moving):
             break
-        lanes = Lanes.of([one.problem for one in rounds])
+        lanes = Lanes.of([one.problem for one in rounds], plain.force_noise)
         tried = np.flatnonzero(moving | (depends is not None))
         again = solve(lanes._replace(damper=tried), y[tried])
         length = np.sqrt(np.maximum(np.diagonal(again.aux, axis1=1, axis2=2)[:, :-1], 0.0))

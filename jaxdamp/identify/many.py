@@ -35,7 +35,7 @@ from jaxdamp.identify.many_records import (
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.model import initial_state_for, own_names, rig_of
 from jaxdamp.identify.preparing import Beginning, weights
-from jaxdamp.identify.settings import MANY, ManySettings
+from jaxdamp.identify.settings import FIT, FitSettings
 from jaxdamp.identify.several import other_starts
 from jaxdamp.identify.starting import Start
 from jaxdamp.parameters import FreeParameters, name_patterns
@@ -47,7 +47,7 @@ STARTED_FROM = 12  # dampers whose records give the start of a law class
 
 @of_known_numbers
 @one_thread()
-@with_defaults(MANY)
+@with_defaults(FIT, starts=1)
 def fit_many(
     law: Start,
     dampers: Mapping[str, BenchRun | Iterable[BenchRun]] | Iterable[BenchRun | Iterable[BenchRun]],
@@ -58,7 +58,7 @@ def fit_many(
     file: str | os.PathLike[str] | None = None,
     cluster: Cluster = None,
     progress: Callable[[int, int], None] | None = None,
-    **options: Unpack[ManySettings],
+    **options: Unpack[FitSettings],
 ) -> ManyFits:
     """Fit one law to many dampers at once: the same least squares as `fit`, for all of them side by side.
 
@@ -83,9 +83,11 @@ def fit_many(
             are new or whose records changed. A law class starts from the first damper, so that a store can grow.
         cluster: who computes the blocks, as in `jaxdamp.sweep`: a Dask `Client`, an executor, or a part such as "3/16".
         progress: of the blocks, called with the number of rows done and of all rows, 64 in a block.
-        options: keywords of `fit`, all optional: `over`, `freeze`, `bounds`, `tie`, `priors` (see `Free`),
-            `initial_state`, `samples_per_cycle` (see `Records`), `loss`, `max_steps` (see `Search`), `weighting`,
-            `starts`, 1 if left out, and `bad_records` (see `ManySettings`).
+        options: all keywords of `fit` (see `FitSettings`), for each damper; `starts` is 1 if left out, and `weighting`
+            "samples" or "runs". A prior is the same for every damper, and counts once for all of a shared parameter.
+            With `initial_state="estimated"`, `per_record`, `input_noise` or `solver` the dampers are fitted one after
+            the other and cannot share parameters; of numbers of single records the result has the mean over the records
+            of a damper.
 
     Returns:
         The laws with their parameters, standard errors, scores and a status each; dampers that differ from the others
@@ -109,6 +111,8 @@ def fit_many(
     _checks.one_of("loss", how["loss"], LOSSES)
     _checks.one_of("initial_state", how["initial_state"], INITIAL_STATES)
     _checks.counts(max_steps=how["max_steps"], starts=how["starts"])
+    if how["force_noise"] is not None:
+        _checks.positive("force_noise", how["force_noise"])
     stated = None if settings is None else tuple(map(float, settings))
     by_names = by_name(dampers)
     if file is not None or cluster is not None:
@@ -144,16 +148,20 @@ def fitted_together(
     how: Options = {**options, "bad_records": "keep"}
     many = functools.partial(ManyFits, tuple(dampers), records, settings, free=free, options=how)
     initial_state = initial_state_for(begin.model, options["initial_state"])
-    if initial_state == "estimated":
+    estimated = {"initial_state": "estimated"} if initial_state == "estimated" else {}
+    others: dict[str, object] = {name: options[name] for name in ("per_record", "input_noise", "solver")}
+    alone = estimated | {name: value for name, value in others.items() if value is not None and value != ()}
+    if alone:
         if depends is not None:
-            remedy = "Leave out `shared`, or take another `initial_state`."
-            _checks.refuse("initial_state", "be the same for dampers that share parameters", "'estimated'", remedy)
-        return many(**_one_by_one(records, begin.law, free, how))
+            name, value = next(iter(alone.items()))
+            _checks.refuse("shared", f"be left out with `{name}`: such dampers are fitted by themselves", repr(value))
+        return many(**_one_by_one(records, begin.law, free, how, "law." if estimated and not rig_of(free.tree) else ""))
     start = begin._replace(initial_state=initial_state, priors=_once(begin.priors, free, depends))
     sigma, by_runs = [weights(options["weighting"], runs) for runs in records], options["weighting"] == "runs"
     problems = start.problems(records, sigma, options["samples_per_cycle"], each=by_runs)
     how_far = options["loss"], options["starts"], options["max_steps"]
-    return many(dependence=depends, **_side_by_side(Lanes.of(problems), records, depends, *how_far))
+    lanes = Lanes.of(problems, options["force_noise"])
+    return many(dependence=depends, **_side_by_side(lanes, records, depends, *how_far))
 
 
 def _side_by_side(
@@ -161,13 +169,13 @@ def _side_by_side(
     records: Sequence[Sequence[BenchRun]],
     depends: Dependence | None,
     loss: str,
-    starts: int,
+    starts: int | None,
     max_steps: int,
 ) -> dict[str, Any]:
     """What the searches of all dampers end with: fields of the result."""
     everyone = lanes.damper
     lanes, begin = _with_other_starts(lanes, records, starts)
-    if depends is not None and starts > 1:  # each alone first, from where all together begin
+    if depends is not None and starts != 1:  # each alone first, from where all together begin
         alone, best, _ = _solved(lanes, begin, None, max_steps)
         lanes, begin = lanes._replace(damper=everyone), alone.y[best]
     end, best, vector = _solved(lanes, begin, depends, max_steps)
@@ -189,20 +197,21 @@ def _side_by_side(
 
 
 def _one_by_one(
-    records: Sequence[tuple[BenchRun, ...]], law: AbstractDamper, free: FreeParameters, how: Options
+    records: Sequence[tuple[BenchRun, ...]], law: AbstractDamper, free: FreeParameters, how: Options, prefix: str
 ) -> dict[str, Any]:
-    """Each damper by a fit of its own, where records have numbers of their own: states at their beginning."""
+    """Each damper by a fit of its own; the paths of its law begin with the prefix."""
     from jaxdamp.identify.fitting import fit  # which hands many dampers to this file
 
     results = [fit(law, runs, **how) for runs in records]
-    paths = free.names if rig_of(free.tree) else [f"law.{name}" for name in free.names]
 
     def each(read: Callable[[FitResult], object]) -> np.ndarray:
         return np.array([read(result) for result in results])
 
+    numbers = each(lambda result: [_mean_over_records(result, prefix + name) for name in free.names])
     return {
-        "values": each(lambda result: [result.estimate(path).value for path in paths]),
-        "standard_errors": each(lambda result: [result.estimate(path).standard_error for path in paths]),
+        "values": numbers[..., 0],
+        "standard_errors": numbers[..., 1],
+        "bias": numbers[..., 2] if how["input_noise"] else None,
         "fit_percent": each(lambda result: result.fit_percent),
         "rmse": each(lambda result: result.rmse),
         "status": tuple(result.status for result in results),
@@ -210,6 +219,19 @@ def _one_by_one(
         "record_rmse": tuple(np.array([score.rmse for score in result.scores]) for result in results),
         "share_left_out": each(lambda result: result.evidence.problem.share_left_out if result.evidence else 0.0),
     }
+
+
+def _mean_over_records(result: FitResult, path: str) -> tuple[float, float, float]:
+    """Value, standard error and bias of a number, zero if it was not asked for; the mean if each record has its own."""
+    names = [e.name for e in result.parameters]
+    own = [i for i, name in enumerate(names) if name == path or name.startswith(f"{path}[")]
+    chosen = [result.parameters[i] for i in own]
+    error = np.sqrt(np.mean(result.covariance[np.ix_(own, own)])) if len(own) > 1 else chosen[0].standard_error
+    return (
+        float(np.mean([e.value for e in chosen])),
+        float(error),
+        float(np.mean([e.bias or 0.0 for e in chosen])),
+    )
 
 
 def _once(priors: Sequence[Priors], free: FreeParameters, depends: Dependence | None) -> tuple[Priors, ...]:
@@ -225,14 +247,14 @@ def _once(priors: Sequence[Priors], free: FreeParameters, depends: Dependence | 
 
 
 def _with_other_starts(
-    lanes: Lanes, records: Sequence[Sequence[BenchRun]], starts: int
+    lanes: Lanes, records: Sequence[Sequence[BenchRun]], starts: int | None
 ) -> tuple[Lanes, Float[np.ndarray, "lanes free"]]:
     """A lane for every start of every damper, and the coordinates to start from."""
     free, together = lanes.searches[0].coordinates.free, [run for runs in records for run in runs]
     begin = [np.asarray(free.values)]
-    if starts > 1:
+    if starts != 1:
         reach = Reach(0.5 * max(float(np.ptp(r.stroke)) for r in together), max(r.peak_velocity for r in together))
-        begin += other_starts(free, reach)[: starts - 1]
+        begin += other_starts(free, reach)[: None if starts is None else starts - 1]
     coordinates = np.array([lanes.searches[0].coordinates.from_physical(values) for values in begin], np.float64)
     dampers = np.arange(len(records))
     return lanes._replace(damper=dampers.repeat(len(begin))), np.tile(coordinates, (len(records), 1))

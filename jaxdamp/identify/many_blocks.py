@@ -26,7 +26,8 @@ from jaxdamp.identify.starting import Start
 BLOCK = 64  # dampers: some seconds of work, and few enough records for any memory
 ABSENT = "Its records were not among those of the call that came to its block."
 FLOAT = np.dtype(np.float64)
-NUMBERS = ("fit_percent", "rmse", "drift", "share_left_out")  # of each damper, beside values and standard errors
+OF_EACH = ("values", "standard_errors", "bias")  # of each parameter of each damper
+NUMBERS = ("fit_percent", "rmse", "drift", "share_left_out")  # of each damper, beside those of its parameters
 
 
 @final
@@ -72,7 +73,7 @@ class DamperFits(AbstractWork):
         """Rows that hold why there is no fit; those without a damper hold nothing."""
         size, count = indices.size, len(self._beginning.free.names)
         named = np.array([int(row) in self._names for row in indices])
-        empty = {name: np.full((size, count), np.nan) for name in ("values", "standard_errors")}
+        empty = {name: np.full((size, count), np.nan) for name in OF_EACH}
         empty |= {name: np.full(size, np.nan) for name in NUMBERS}
         texts = {name: np.full(size, "", dtype=object) for name in ("status", "record_rmse")}
         reasons = np.where(named, reason, "").astype(object)
@@ -111,6 +112,7 @@ def _row(many: ManyFits, place: int) -> dict[str, object]:
         name: getattr(many, name)[place] for name in ("values", "standard_errors", "fit_percent", "rmse", "steps")
     }
     row |= {name: array[place] for name in ("drift", "share_left_out") if (array := getattr(many, name)).size}
+    row |= {} if many.bias is None else {"bias": many.bias[place]}
     errors = json.dumps(many.record_rmse[place].tolist() if many.record_rmse else [])
     return row | {"status": many.status[place].name.lower(), "record_rmse": errors}
 
@@ -170,10 +172,10 @@ def _checked_path(
 
 def _found(store: BlockStore, rows: np.ndarray, names: tuple[str, ...]) -> dict[str, Any]:
     """What a store holds of some dampers: fields of the result; those that were left out are named."""
-    found: dict[str, Any] = store.read(
-        "values", "standard_errors", *NUMBERS, "steps", "status", "record_rmse", "reason"
-    )
+    found: dict[str, Any] = store.read(*OF_EACH, *NUMBERS, "steps", "status", "record_rmse", "reason")
     found = {name: values[rows] for name, values in found.items()}
+    if not np.any(np.isfinite(found["bias"])):  # nobody asked for it
+        del found["bias"]
     status = tuple(Status[text.upper()] if text else Status.LEFT_OUT for text in found["status"])
     reasons = [str(reason) for reason in found.pop("reason")]
     left = [name for name, reason in zip(names, reasons, strict=True) if reason]
@@ -213,7 +215,7 @@ class RecordsInOrder(Sequence[tuple[BenchRun, ...]]):
 def _rows(path: Path, identity: Mapping[str, str], records: AllRecords, count: int) -> tuple[BlockStore, np.ndarray]:
     """The store, with a row for every damper of the call; new and changed ones are in further blocks at its end."""
     variables = {
-        **{name: Variable({"parameter": count}, FLOAT, {}) for name in ("values", "standard_errors")},
+        **{name: Variable({"parameter": count}, FLOAT, {}) for name in OF_EACH},
         **{name: Variable({}, FLOAT, {}) for name in NUMBERS},
         **{name: Variable({}, str, {}) for name in ("name", "stamp", "status", "record_rmse", "reason")},
         "steps": Variable({}, np.dtype(np.int32), {}),
@@ -270,7 +272,11 @@ def _identity(beginning: Beginning, options: Options) -> dict[str, str]:
     for leaf in leaves:
         digest.update(np.asarray(leaf).tobytes() if isinstance(leaf, jax.Array | np.ndarray) else repr(leaf).encode())
     start = f"{type(beginning.law).__name__} ({digest.hexdigest()[:12]})"
-    said = {name: str(value) for name, value in options.items() if name not in ("rig", "over", "freeze")}
+    said = {
+        name: re.sub(r" at 0x\w+", "", str(value))
+        for name, value in options.items()
+        if name not in ("rig", "over", "freeze")
+    }
     return {"start": start, "parameters": ", ".join(beginning.free.names), **said}
 
 

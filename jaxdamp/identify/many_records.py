@@ -11,16 +11,15 @@ from jaxdamp.identify.contradicting import contradicting, refuse_contradicting
 from jaxdamp.identify.machine import Machine
 from jaxdamp.identify.model import Model
 from jaxdamp.identify.preparing import Beginning, begun
-from jaxdamp.identify.settings import FREE, PROBLEM, ManySettings, ProblemSettings
+from jaxdamp.identify.settings import FREE, PROBLEM, FitSettings, ProblemSettings
 from jaxdamp.identify.starting import Start
-from jaxdamp.identify.stated import stated_parameters
 
 
 CALL = 'fit_many(law, {"A": runs_of_a, "B": runs_of_b})'
 AllRecords = Mapping[str, tuple[BenchRun, ...]]
 
 
-class Options(ManySettings, total=False):
+class Options(FitSettings, total=False):
     """What a call asks of each fit."""
 
     rig: Machine
@@ -59,15 +58,8 @@ def fitted_records(name: str, runs: tuple[BenchRun, ...], options: Options) -> t
 
 
 def refuse_several_laws(name: str, runs: tuple[BenchRun, ...], model: Model, options: Options) -> None:
-    """Refuse records of one damper that no one law can follow, unless they are to be kept, or begin by themselves.
-
-    Records that state parameters of the law are refused, too.
-    """
-    if paths := list(stated_parameters(model, runs)):
-        remedy = "Fit such dampers one by one, with `fit`, or leave this setting out."
-        must = "have records that state no parameter of the law"
-        _checks.refuse(f"dampers[{name!r}]", must, ", ".join(paths), remedy)
-    if options["bad_records"] != "keep" and options["initial_state"] != "estimated":
+    """Refuse records of one damper that no one law can follow, unless they are to be kept or have own numbers."""
+    if options["bad_records"] != "keep" and not options["per_record"] and options["initial_state"] != "estimated":
         refuse_contradicting(contradicting(model, runs), f"dampers[{name!r}]")
 
 

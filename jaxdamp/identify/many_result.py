@@ -21,6 +21,7 @@ from jaxdamp.identify.estimating import WEAK
 from jaxdamp.identify.initial_states import DRIFT
 from jaxdamp.identify.model import Model, covered_range, joined_range, law_of, rig_of, with_range
 from jaxdamp.identify.settings import FitSettings
+from jaxdamp.identify.stated import stated_parameters, with_stated
 from jaxdamp.parameters import Coordinates, FreeParameters
 from jaxdamp.rig import Rig
 
@@ -57,6 +58,7 @@ class ManyFits(AbstractResult):
         share_left_out: of the samples of each damper, to which a robust loss gives less than half weight.
         drift: largest relative change of the states of each damper over the cycle before a record that starts in the
             periodic solution.
+        bias: of the values by the noise of stroke and velocity, if `input_noise` was given.
         options: of the call, for `fit` of one damper.
         reasons: of fits in a store, why a damper was left out; empty for the others.
     """
@@ -76,6 +78,7 @@ class ManyFits(AbstractResult):
     record_rmse: tuple[Float[np.ndarray, " _"], ...] = ()
     share_left_out: Float[np.ndarray, " _"] = dataclasses.field(default_factory=lambda: np.zeros(0))
     drift: Float[np.ndarray, " _"] = dataclasses.field(default_factory=lambda: np.zeros(0))
+    bias: Float[np.ndarray, "dampers free"] | None = None
     options: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     reasons: tuple[str, ...] = ()
 
@@ -94,7 +97,8 @@ class ManyFits(AbstractResult):
         if self.status[place] is Status.LEFT_OUT:
             must, value = "name a damper that was fitted", f"{self.names[place]!r} ({self.reasons[place]})"
             _checks.refuse("name", must, value, "Take the laws of the others by name: `many[name]`.")
-        return with_range(self.free.started_at(self.values[place]).tree, covered_range(self.records[place]))
+        runs, model = self.records[place], self.free.started_at(self.values[place]).tree
+        return with_range(with_stated(model, stated_parameters(model, runs)), covered_range(runs))
 
     @property
     def laws(self) -> tuple[AbstractDamper, ...]:
@@ -201,6 +205,10 @@ class ManyFits(AbstractResult):
             if share > NOT_COUNTED + float(np.nanmedian(self.share_left_out)):
                 texts[i].append(f"{100.0 * share:.2g} % of its samples have less than half weight")
         for j, name in enumerate(self.parameters):
+            for i in () if self.bias is None else np.flatnonzero(np.abs(self.bias[:, j]) > self.standard_errors[:, j]):
+                unit = f" {self.free.owners[j].unit}".rstrip()
+                words = f"noise of stroke and velocity biases {name} by about {self.bias[i, j]:+.2g}{unit}"
+                texts[i].append(words)
             values = self.values[fitted, j]
             expected, scores = _trend(values, settings), _robust_scores(values, settings)
             apart = np.abs(values - expected)
@@ -225,16 +233,18 @@ class ManyFits(AbstractResult):
         columns = [Column("damper"), *([Column("setting")] if self.settings is not None else [])]
         for name, owner in zip(self.parameters, self.free.owners, strict=True):
             columns += [Column(name, owner.unit), Column("±", owner.unit)]
+            columns += [Column("bias", owner.unit)] * (self.bias is not None)
         columns += [Column("fit", "%", ".1f"), Column("RMSE", "N", ".1f"), Column("remark")]
         rows = []
         for i, name in enumerate(self.names):
             row: list[Cell] = [name, *([self.settings[i]] if self.settings is not None else [])]
             if self.status[i] is Status.LEFT_OUT:
-                rows.append((*row, *[None] * (2 * len(self.parameters) + 2), self.remarks[i]))
+                rows.append((*row, *[None] * (len(columns) - len(row) - 1), self.remarks[i]))
                 continue
-            for value, error in zip(self.values[i], self.standard_errors[i], strict=True):
+            for j, (value, error) in enumerate(zip(self.values[i], self.standard_errors[i], strict=True)):
                 texts = rounded(float(value), float(error))
                 row += [Shown(float(value), texts[0]), Shown(float(error), texts[1])]
+                row += [] if self.bias is None else [float(self.bias[i, j])]
             rows.append((*row, float(self.fit_percent[i]), float(self.rmse[i]), self.remarks[i]))
         return Table(
             f"{type(law_of(self.free.tree)).__name__} fitted to {len(self)} dampers", tuple(columns), tuple(rows)
@@ -251,6 +261,11 @@ class ManyFits(AbstractResult):
                 **({} if self.settings is None else {"setting": self.settings[i]}),
                 "values": plain(dict(zip(names, self.values[i].tolist(), strict=True))),
                 "standard_errors": plain(dict(zip(names, self.standard_errors[i].tolist(), strict=True))),
+                **(
+                    {"bias": plain(dict(zip(names, self.bias[i].tolist(), strict=True)))}
+                    if self.bias is not None
+                    else {}
+                ),
                 "fit": with_unit(float(self.fit_percent[i]), "%"),
                 "rmse": with_unit(float(self.rmse[i]), "N"),
                 "status": self.status[i].name.lower(),

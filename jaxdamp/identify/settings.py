@@ -134,25 +134,6 @@ class ScheduledSettings(ComparisonSettings, total=False):
     progress: Callable[[str], None] | None
 
 
-class ManySettings(Free, Records, Search, total=False):
-    """The keywords that `fit_many` has from `fit`: those of `Free`, `Records` and `Search`, and these.
-
-    Dampers whose states drift in a motion that is said to be periodic have a remark; with "estimated" states they are
-    fitted one after the other. A prior is the same for every damper, and counts once for all of a shared parameter.
-
-    Arguments:
-        weighting: of the records of a damper: `"samples"` or `"runs"`, as in `FitSettings`.
-        starts: largest number of starts of each damper, side by side: `law`, then those that it proposes. Shared
-            parameters then begin where the fits of single dampers end.
-        bad_records: "refuse", "leave_out" or "keep" records with an error, as in `FitSettings`; a damper keeps one at
-            least.
-    """
-
-    weighting: str
-    starts: int
-    bad_records: str
-
-
 class VehicleSettings(Free, Search, total=False):
     """The keywords that `fit_vehicle` has from `fit`: those of `Free` and `Search`, and these.
 
@@ -200,10 +181,6 @@ FIT: FitSettings = {
 }  # fmt: skip
 COMPARISON: ComparisonSettings = {**FIT, "common": (), "blend": None}
 SCHEDULED: ScheduledSettings = {**COMPARISON, "progress": None}
-MANY: ManySettings = {
-    **FREE, **RECORDS, "loss": "squares", "max_steps": 200, "weighting": "samples", "starts": 1,
-    "bad_records": "refuse",
-}  # fmt: skip
 VEHICLE: VehicleSettings = {
     **FREE, "loss": "squares", "max_steps": 100, "per_record": (), "dt": None, "samples_per_cycle": 400, "starts": 1,
     "seed": 0, "solver": None,

@@ -109,6 +109,11 @@ class VehicleData(NamedTuple):
 def checked_records(vehicle: AbstractVehicle, records: RideRecord | Iterable[RideRecord]) -> tuple[RideRecord, ...]:
     """The records, after a check that the vehicle has their channels and wheels."""
     refuse_controller(vehicle, "a fit")
+    if isinstance(records, Mapping):
+        remedy = (
+            "Of several vehicles, each has a fit of its own: `{name: fit(vehicle, rides[name]) for name in rides}`."
+        )
+        _checks.refuse("records", "be one or more records of one vehicle", _checks.described(records), remedy)
     rides = tuple(records) if isinstance(records, Iterable) else (records,)
     if not rides:
         _checks.refuse("records", "hold at least one record", "empty", "Read some with `bench.read_rides`.")

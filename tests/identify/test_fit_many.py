@@ -5,6 +5,7 @@ import json
 from typing import Any
 
 import numpy as np
+import optimistix as optx
 import pytest
 
 from jaxdamp import identify
@@ -208,6 +209,43 @@ def test_losses_and_priors_are_those_of_single_fits(clicks, options):
         assert many.unusual == ("10",) and "of its samples have less than half weight" in many.remarks[5]
 
 
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"force_noise": 8.0},
+        {"input_noise": (2e-5, 2e-2)},
+        {"per_record": ["rebound_rate"]},
+        {"solver": optx.LevenbergMarquardt(rtol=1e-8, atol=1e-8)},
+    ],
+    ids=lambda options: next(iter(options)),
+)
+def test_every_option_of_a_single_fit_is_one_of_many(clicks, options):
+    some = {name: clicks[name] for name in ("0", "10")}
+    many = fit_many(Bilinear, some, rig="gas", **options)
+    single = fit(Bilinear, clicks["10"], rig="gas", starts=1, **options)
+    paths = many.parameters
+    assert paths == ("law.rebound_rate", "law.compression_rate", "rig.gas_force")
+    for j, path in enumerate(paths):
+        own = [i for i, e in enumerate(single.parameters) if e.name.partition("[")[0] == path]
+        error = np.sqrt(np.mean(single.covariance[np.ix_(own, own)]))
+        assert many.values[1, j] == pytest.approx(np.mean([single.parameters[i].value for i in own]), abs=0.02 * error)
+        assert many.standard_errors[1, j] == pytest.approx(error, rel=0.01)
+        assert float(get(many.models[1], path)) == pytest.approx(float(get(single.model, path)), abs=0.02 * error)
+    if "input_noise" in options:
+        np.testing.assert_allclose(many.bias[1], [e.bias for e in single.parameters], rtol=0.02)
+        assert "noise of stroke and velocity biases law.rebound_rate by about -" in many.remarks[1]
+        assert [column.name for column in many.table().columns].count("bias") == 3
+        assert many.to_dict()["dampers"]["10"]["bias"]["law.rebound_rate"] == pytest.approx(many.bias[1, 0])
+    if "force_noise" in options:
+        shared = fit_many(Bilinear, some, rig="gas", shared=["*_rate", "gas_force"], **options)
+        together = fit(Bilinear, [*clicks["0"], *clicks["10"]], rig="gas", bad_records="keep", starts=1, **options)
+        errors = [e.standard_error for e in together.parameters]
+        np.testing.assert_allclose(shared.standard_errors[0], errors, rtol=0.1)
+    else:
+        with pytest.raises(ValueError, match=f"`shared` must be left out with `{next(iter(options))}`"):
+            fit_many(Bilinear, some, rig="gas", shared=["gas_force"], **options)
+
+
 def test_a_bad_record_of_a_damper_is_named(clicks):
     bad = [dataclasses.replace(run, force=run.force * (1.3 if i else 1.0)) for i, run in enumerate(clicks["6"])]
     many = fit_many(Bilinear, clicks | {"6": bad}, rig="gas")
@@ -239,7 +277,7 @@ def test_states_at_the_beginning_are_estimated_damper_by_damper():
     many = fit_many(begun, dampers, initial_state="estimated")
     single = fit(begun, dampers["B"], initial_state="estimated", starts=1)
     np.testing.assert_allclose(many.values[1], [single[name].value for name in many.parameters], rtol=1e-9)
-    with pytest.raises(ValueError, match="be the same for dampers that share parameters"):
+    with pytest.raises(ValueError, match="`shared` must be left out with `initial_state`"):
         fit_many(begun, dampers, initial_state="estimated", shared=["lag_time"])
 
 

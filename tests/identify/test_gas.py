@@ -18,7 +18,7 @@ from jaxdamp.dampers import (
     TwinTube,
     with_command,
 )
-from jaxdamp.identify import fit, fit_scheduled
+from jaxdamp.identify import ManyFits, fit, fit_scheduled
 from jaxdamp.parameters import get, replace
 from jaxdamp.rig import Rig
 
@@ -90,6 +90,17 @@ def test_records_at_one_pressure_do_not_tell_it_from_area_preload_or_zero(runs):
     assert not [warning for warning in known.warnings if "one gas pressure" in warning]
 
 
+def test_many_dampers_have_the_gas_at_the_pressures_that_their_records_state(runs):
+    dampers = {"A": [*runs[:2], *runs[2:4]], "B": [*runs[2:4], *runs[4:]]}
+    many = fit(BEGIN, dampers, freeze=HELD, rig="offset")
+    for place, (name, records) in enumerate(dampers.items()):
+        single = fit(BEGIN, records, freeze=HELD, rig="offset", starts=1)
+        assert isinstance(many, ManyFits) and many.parameters == tuple(e.name for e in single.parameters)
+        np.testing.assert_allclose(many.values[place], [e.value for e in single.parameters], rtol=1e-3)
+        for path in ("terms.1.pressure", "terms.1.volume"):
+            assert float(get(many[name], path)) == pytest.approx(float(get(single.law, path)), rel=1e-3)
+
+
 def test_a_number_that_the_pressure_changes_has_a_value_for_each():
     frictions = (20.0, 30.0, 45.0)
     dampers = [replace(DAMPER, {"friction_force": friction}) for friction in frictions]
@@ -121,8 +132,9 @@ def test_records_that_do_not_state_it_well_are_refused(runs):
             fit(BEGIN, wrong, freeze=HELD, starts=1)
     with pytest.raises(ValueError, match=r"name numbers that the records do not state, but is terms\.1\.pressure"):
         fit(BEGIN, runs, freeze=HELD, per_record=["pressure"], starts=1)
-    with pytest.raises(ValueError, match=r"records that state no parameter of the law, but is terms\.1\.pressure"):
-        fit(BEGIN, {"A": runs[:2], "B": runs[2:4]}, freeze=HELD)
+    with pytest.raises(ValueError, match="must all state their pressure, but is without one: slow 1, fast 1"):
+        silent = [dataclasses.replace(run, settings={}) for run in runs[2:4]]
+        fit(BEGIN, {"A": runs[:2], "B": silent}, freeze=HELD)
     other = dataclasses.replace(runs[1], force=1.3 * runs[1].force, name="another")
     with pytest.raises(ValueError, match=r"be records that one law can follow, but is .*fast 0 and another"):
         fit(BEGIN, [*runs, other], freeze=HELD, starts=1)

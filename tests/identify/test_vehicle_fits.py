@@ -146,6 +146,7 @@ def wrong(**changed):
     ("records", "options", "message"),
     [
         ([], {}, "`records` must hold at least one"),
+        ({"A": wrong()}, {}, "be one or more records of one vehicle, but is a dict of 1"),
         ([wrong(channels={"strok": np.sin(np.arange(100.0))})], {}, "Did you mean 'stroke'"),
         ([wrong(units={"stroke": "m/s"})], {}, "in the units of the vehicle, m, but is m/s for 'stroke'"),
         ([wrong(road=np.ones((100, 2)) * np.arange(100.0)[:, None])], {}, "a column for each of 1 wheel"),
