@@ -4,7 +4,7 @@ import dataclasses
 import functools
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Unpack
+from typing import Any, Unpack, cast
 
 import jax.numpy as jnp
 import numpy as np
@@ -107,7 +107,7 @@ def fit_many(
     2150.0
     """
     how: Options = {"rig": rig, **options}
-    _checks.one_of("weighting", how["weighting"], ["samples", "runs"])
+    _checks.one_of("weighting", cast(str, how["weighting"]), ["samples", "runs"])
     _checks.one_of("loss", how["loss"], LOSSES)
     _checks.one_of("initial_state", how["initial_state"], INITIAL_STATES)
     _checks.counts(max_steps=how["max_steps"], starts=how["starts"])

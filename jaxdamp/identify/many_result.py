@@ -205,9 +205,10 @@ class ManyFits(AbstractResult):
             if share > NOT_COUNTED + float(np.nanmedian(self.share_left_out)):
                 texts[i].append(f"{100.0 * share:.2g} % of its samples have less than half weight")
         for j, name in enumerate(self.parameters):
-            for i in () if self.bias is None else np.flatnonzero(np.abs(self.bias[:, j]) > self.standard_errors[:, j]):
+            bias = np.zeros(len(self)) if self.bias is None else self.bias[:, j]
+            for i in np.flatnonzero(np.abs(bias) > self.standard_errors[:, j]):
                 unit = f" {self.free.owners[j].unit}".rstrip()
-                words = f"noise of stroke and velocity biases {name} by about {self.bias[i, j]:+.2g}{unit}"
+                words = f"noise of stroke and velocity biases {name} by about {bias[i]:+.2g}{unit}"
                 texts[i].append(words)
             values = self.values[fitted, j]
             expected, scores = _trend(values, settings), _robust_scores(values, settings)

@@ -34,15 +34,15 @@ def lyapunov(a: Float[Array, "n n"], q: Float[Array, "n n"]) -> tuple[Float[Arra
         p, e = series
         return (q + (short @ p + p @ short.T) / divisor, short + short @ e / divisor), None
 
-    (p, change), _ = jax.lax.scan(nest, (q, short), jnp.arange(_TERMS, 1.0, -1.0, dtype=a.dtype))
+    (started, change), _ = jax.lax.scan(nest, (q, short), jnp.arange(_TERMS, 1.0, -1.0, dtype=a.dtype))
 
     def double(now: tuple[Array, Array, Array], _: None) -> tuple[tuple[Array, Array, Array], None]:
         p, e, _ = now
         moved = p + e @ p
         return (p + moved + moved @ e.T, 2.0 * e + e @ e, p), None
 
-    p = first * p
-    (p, _, before), _ = jax.lax.scan(double, (p, change, p), None, length=_DOUBLINGS)
+    begin = first * started, change, first * started
+    (p, _, before), _ = jax.lax.scan(double, begin, None, length=_DOUBLINGS)
     return p, jnp.max(jnp.abs(p - before)) <= _SETTLED * jnp.max(jnp.abs(p))
 
 
