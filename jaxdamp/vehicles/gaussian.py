@@ -37,7 +37,7 @@ def lyapunov(a: Float[Array, "n n"], q: Float[Array, "n n"]) -> tuple[Float[Arra
     (started, change), _ = jax.lax.scan(nest, (q, short), jnp.arange(_TERMS, 1.0, -1.0, dtype=a.dtype))
 
     def double(now: tuple[Array, Array, Array], _: None) -> tuple[tuple[Array, Array, Array], None]:
-        p, e, _ = now
+        p, e = now[:2]
         moved = p + e @ p
         return (p + moved + moved @ e.T, 2.0 * e + e @ e, p), None
 
