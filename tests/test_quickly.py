@@ -1,5 +1,6 @@
 """What one vehicle needs once is compiled without optimisation, and in other functions as a part of these."""
 
+import functools
 from collections.abc import Callable
 
 import jax
@@ -31,11 +32,17 @@ def test_it_is_the_same_function_alone_and_inside_others(squared: Callable) -> N
 
 def test_only_what_is_small_and_called_by_itself_takes_the_options(monkeypatch: pytest.MonkeyPatch) -> None:
     """An option that there is not is refused where it is used, and only there."""
-    monkeypatch.setattr(_quickly, "OPTIONS", {"xla_no_such_option": True})
-    function = compiled_quickly(jnp.sum, lambda x: x.size < 3)
-    assert float(function(jnp.ones(3))) == 3.0 and float(jax.jit(function)(jnp.ones(2))) == 2.0
+    monkeypatch.setattr(_quickly, "OPTIONS", {0: {"xla_no_such_option": 0}, 1: {"xla_no_loop_option": 0}, None: None})
+    make = functools.partial(compiled_quickly, jnp.sum, lambda x: None if x.size == 3 else x.size - 1)
+    function = make()
+    assert float(function(jnp.ones(3))) == 3.0 and float(jax.jit(function)(jnp.ones(1))) == 1.0
     with pytest.raises(Exception, match="xla_no_such_option"):
-        function(jnp.ones(2))
+        function(jnp.ones(1))
+    monkeypatch.setenv("XLA_FLAGS", "--xla_backend_optimization_level=2")  # stated by the user
+    assert float(function(jnp.ones(2))) == 2.0
+    monkeypatch.delenv("XLA_FLAGS")
+    with pytest.raises(Exception, match="xla_no_loop_option"):
+        make()(jnp.ones(2))
 
 
 def test_a_ride_on_a_white_road_is_one_function_in_a_loop_a_batch_and_a_program() -> None:

@@ -82,6 +82,12 @@ def test_of_a_law_with_other_numbers(name):
     assert first > 0 and others == [0, 0]
 
 
+def test_of_a_sweep_of_few_points_with_options_of_its_own(monkeypatch):
+    monkeypatch.delenv("XLA_FLAGS")  # which states those of all tests
+    first, second = in_calls(swept, [1400.0, 1600.0])
+    assert first > 0 and second == 0
+
+
 OF_A_LENGTH = {
     "respond": (2, lambda count: respond(Bilinear(1500.0, 900.0), 1e-3 * np.arange(count), np.zeros(count))),
     "frequency response": (1, lambda count: frequency_response(half_car_002(), np.arange(float(count)), speed=20.0)),

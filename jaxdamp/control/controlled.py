@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._quickly import compiled_quickly
 from jaxdamp._types import Number, Scalar
 from jaxdamp.control.actuator import RateLimit
 from jaxdamp.control.levels import forces_at, laws_at_levels, scheduled_in
@@ -147,7 +148,7 @@ def _channels(dampers: Sequence[str]) -> list[Channel]:
     return commands + [Channel(f"{d}_demand", ChannelKind.FORCE, d, words.format(d)) for d in dampers]
 
 
-@eqx.filter_jit
+@compiled_quickly
 def _forces_at_levels(car: AbstractVehicle, velocity: Scalar) -> dict[str, Float[Array, " levels"]]:
     """Of each damper that takes a command, its force at a velocity at all levels, with the same states."""
     forces = {}
@@ -157,7 +158,7 @@ def _forces_at_levels(car: AbstractVehicle, velocity: Scalar) -> dict[str, Float
     return forces
 
 
-@eqx.filter_jit
+@compiled_quickly
 def _controlled_system(vehicle: Controlled, layout: Layout) -> System:
     system, frame = vehicle.car.system(), vehicle.car.frame()
     takes = [name for name, law in zip(system.layout.ports, system.laws, strict=True) if len(scheduled_in(law)) == 1]

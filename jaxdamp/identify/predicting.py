@@ -3,11 +3,11 @@
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from jaxdamp import _checks
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._tables import Contents, with_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
@@ -32,7 +32,7 @@ def _predict(batch: Batch, model: Model) -> tuple[np.ndarray, np.ndarray]:
     return np.asarray(forces), np.asarray(change)
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def _predicted_by_xla(batch: Batch, model: Model) -> tuple[Array, Array]:
     return batch.settled_forces(model)
 

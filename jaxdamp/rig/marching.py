@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._jacobian import Mode
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._sharded import varying_as
 from jaxdamp._types import ScalarLike, Signal, State
 from jaxdamp.dampers import AbstractDamper, at_command
@@ -111,7 +112,7 @@ def march(
     return march_states(law, dt, stroke, velocity, substeps, followed, state)[0]
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def march_states(
     law: AbstractDamper,
     dt: Array,

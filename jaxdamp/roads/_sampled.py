@@ -9,6 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._types import Scalar, Signal, SignalLike
 from jaxdamp.roads.base import AbstractRoad, Columns, fade_in
 
@@ -62,7 +63,7 @@ class SampledRoad(AbstractRoad):
         self._refuse_outside(time)
         return self._interpolated(jnp.asarray(time, self.samples.dtype))
 
-    @eqx.filter_jit
+    @compiled_for_loops
     def _interpolated(self, time: Signal) -> Float[Array, "time wheels"]:
         rate = 1.0 / self.spacing if self.speed is None else self.speed / self.spacing
         height = interpolate(self.samples, time * rate, periodic=self.periodic)

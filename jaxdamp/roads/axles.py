@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from typing import final
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -11,6 +10,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._limits import at_least, at_most
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike, VectorLike
 from jaxdamp.roads._composed import AbstractOnOneRoad, agreed_speed
 from jaxdamp.roads.base import AbstractRoad, Columns
@@ -34,7 +34,7 @@ class Delayed(AbstractOnOneRoad):
         heights = self.road.height(self._passed(jnp.asarray(time, self.delay.dtype)))
         return _by_axle(heights, self.delay.size)
 
-    @eqx.filter_jit
+    @compiled_for_loops
     def _passed(self, time: Signal) -> Float[Array, " times"]:
         """The times at which the road reaches each axle, one axle after the other."""
         # a record is level before its first sample; the road itself refuses given times before it

@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._limits import within
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._traced import behind
 from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
 from jaxdamp.roads.base import AbstractRoad, given_in_time, quintic_step, raised_cosine
@@ -44,7 +45,7 @@ class Bump(AbstractRoad):
         width, peak = behind(self.width), behind(self.peak)
         return None if width is None or peak is None or not np.any(peak) else float(np.min(width))
 
-    @eqx.filter_jit
+    @compiled_for_loops
     def heights_at(self, time: SignalLike) -> Float[Array, "time 1"]:
         """The height [m] at each `time` [s]; see the function that made the road."""
         time = jnp.asarray(time, self.peak.dtype)
@@ -173,7 +174,7 @@ class Step(AbstractRoad):
     ramp: Scalar
     smooth: bool = eqx.field(static=True)
 
-    @eqx.filter_jit
+    @compiled_for_loops
     def heights_at(self, time: SignalLike) -> Float[Array, "time 1"]:
         """The height [m] at each `time` [s]; see `step`."""
         time = jnp.asarray(time, self.rise.dtype)

@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._limits import within
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
 from jaxdamp.roads.base import AbstractRoad, fade_in, given_in_time
 
@@ -26,7 +27,7 @@ class Sine(AbstractRoad):
         """The speed [m/s] that the road was made for."""
         return self.driven_at
 
-    @eqx.filter_jit
+    @compiled_for_loops
     def heights_at(self, time: SignalLike) -> Float[Array, "time 1"]:
         """The height [m] at each `time` [s]; see `sine`."""
         time = jnp.asarray(time, self.amplitude.dtype)
@@ -131,7 +132,7 @@ class SweepSine(AbstractRoad):
     of_velocity: bool = eqx.field(static=True)
     ramp: float = eqx.field(static=True)
 
-    @eqx.filter_jit
+    @compiled_for_loops
     def heights_at(self, time: SignalLike) -> Float[Array, "time 1"]:
         """The height [m] at each `time` [s]; see `sweep_sine`."""
         time = jnp.asarray(time, self.size.dtype)

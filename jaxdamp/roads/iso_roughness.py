@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._random import rayleigh, uniform
 from jaxdamp._traced import behind
 from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
@@ -139,7 +140,7 @@ class Iso8608(AbstractRoad):
     ramp: float = eqx.field(static=True)
     amplitudes: str = eqx.field(static=True)
 
-    @eqx.filter_jit
+    @compiled_for_loops
     def heights_at(self, time: SignalLike) -> Float[Array, "time 1"]:
         """The height [m] at each `time` [s]; see `iso8608`."""
         time = jnp.asarray(time, self.phase.dtype)

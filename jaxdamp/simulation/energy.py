@@ -2,10 +2,10 @@
 
 from typing import TYPE_CHECKING
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array
 
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._types import Scalar
 
 
@@ -18,7 +18,7 @@ def _middle(values: Array) -> Array:
     return 0.5 * (values[1:] + values[:-1])
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def energy_balance(response: "Response") -> dict[str, Scalar]:
     """Where the energy that the road put in has gone [J].
 
@@ -53,7 +53,7 @@ def energy_balance(response: "Response") -> dict[str, Scalar]:
     return parts | {"error": road_work - change - absorbed - dashed}
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def absorbed_by(response: "Response") -> dict[str, Scalar]:
     """Energy that each element has taken in [J], ∫ F ė dt, by its name.
 

@@ -12,6 +12,7 @@ from jaxtyping import Array, ArrayLike, Complex, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._limits import largest
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._steady_cycles import AbstractSteadyCycles, checked_points, is_steady, span
 from jaxdamp._tables import Column, Contents, Table, with_unit
 from jaxdamp._traced import behind
@@ -238,7 +239,7 @@ def _substeps(vehicle: AbstractVehicle, frequency: Array, samples: int, wanted: 
     return count
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def _swept(
     vehicle: AbstractVehicle, frequency: Array, amplitude: Array, delays: Array, samples: int, substeps: int
 ) -> tuple[Cycle, Array, Array]:

@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 from typing import NamedTuple, final
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.ad_checkpoint import checkpoint_name
 from jaxtyping import Array, Float, Int, PyTree
 
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._types import Scalar, Signal
 from jaxdamp._vectors import MemoryLayout, SmallVector, scalars
 from jaxdamp.metrics import Gathered, Metric, discrete_weighting
@@ -52,7 +52,7 @@ class Recorder(AbstractObserver):
         return now.motion, now.states, None if now.control is None else jnp.stack(_of_control(now))
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def recorded(
     engine: AbstractEngine,
     system: System,

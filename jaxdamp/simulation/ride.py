@@ -261,7 +261,7 @@ class Ride(eqx.Module):
                 _checks.refuse(f"point[{name!r}]", must, f"of shape {shape}", remedy)
 
 
-@functools.partial(compiled_quickly, small=lambda ride, point: isinstance(ride.road, WhiteRoad))
+@functools.partial(compiled_quickly, level=lambda ride, point: 0 if isinstance(ride.road, WhiteRoad) else 1)
 def _drive(ride: Ride, point: dict[str, Array]) -> dict[str, Scalar]:
     """The metrics of the vehicle at a point."""
     vehicle = replace(ride.vehicle, point)

@@ -3,13 +3,12 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks, metrics
-from jaxdamp._quickly import compiled_quickly
+from jaxdamp._quickly import compiled_for_loops, compiled_quickly
 from jaxdamp._tables import Compared, Table, comparison_table, percent_change
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Scalar, ScalarLike, Signal
@@ -106,7 +105,7 @@ def _signals(response: "Response", metric: Metric, dt: ScalarLike) -> _Signals:
     return _Signals(signal, rest, response[metric.by] if metric.by else None)
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def _computed(
     signals: dict[str, _Signals], chosen: dict[str, tuple[Statistic, tuple[int, int]]], dt: ScalarLike
 ) -> dict[str, Scalar]:
@@ -120,7 +119,7 @@ def _computed(
     return values
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def _comfort(weighted: Signal, dt: ScalarLike) -> Comfort:
     transient = metrics.max_transient_value(weighted, dt, None)
     return Comfort(metrics.rms(weighted), transient, metrics.vibration_dose_value(weighted, dt, None))

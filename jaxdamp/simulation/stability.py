@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
+from jaxdamp._quickly import compiled_quickly
 from jaxdamp._traced import at_compile_time, is_batched, is_traced, known, row, rows
 from jaxdamp._types import Scalar
 from jaxdamp.control import ControlLoop, laws_at_levels
@@ -220,7 +221,7 @@ def _largest(values: Array | np.ndarray) -> float:
     return float(np.max(np.nan_to_num(np.asarray(values)), initial=0.0))
 
 
-@eqx.filter_jit
+@compiled_quickly
 def _slopes_over_step(
     law: AbstractDamper, velocity: Float[Array, " velocities"], dt: Scalar
 ) -> Float[Array, " velocities"]:
@@ -233,7 +234,7 @@ def _slopes_over_step(
     return jax.vmap(jax.grad(force))(velocity, velocity)
 
 
-@eqx.filter_jit
+@compiled_quickly
 def _slopes_at_instant(
     law: AbstractDamper, velocity: Float[Array, " velocities"], stroke: Float[Array, " strokes"]
 ) -> tuple[Array, Array, Array]:
@@ -251,7 +252,7 @@ def _slopes_at_instant(
     return *jax.vmap(at)(velocity), by_stroke
 
 
-@eqx.filter_jit
+@compiled_quickly
 def _slopes_of_rates(
     law: AbstractDamper, velocity: Float[Array, " velocities"]
 ) -> Float[Array, "velocities states states"]:

@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._types import Scalar
 from jaxdamp._vectors import between
 from jaxdamp.simulation.equations import Equations, RoadInput, StepState, road_rate, settled
@@ -87,7 +87,7 @@ def _padded(heights: Float[Array, "time wheels"]) -> tuple[Float[Array, "padded 
     return jnp.pad(heights, ((0, missing), (0, 0)), mode="edge"), jnp.asarray(heights.shape[0] - 1)
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def _driven(
     system: System,
     road: tuple[Float[Array, "time wheels"], Array],

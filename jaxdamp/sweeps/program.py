@@ -16,6 +16,7 @@ from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jaxtyping import Array
 
 from jaxdamp import _checks
+from jaxdamp._quickly import FEW, Level, options_of
 from jaxdamp.sweeps.axes import Columns
 from jaxdamp.sweeps.function import Traced, evaluate, number_type
 
@@ -122,8 +123,13 @@ class Program:
         return collected
 
 
-def prepare(traced: Traced, count: int, asked: int | None, devices: object, lanes: int | None) -> Program:
-    """Choose devices and chunk, and compile; a chunk that nobody asked for is made to fit into the memory."""
+def prepare(
+    traced: Traced, count: int, asked: int | None, devices: object, lanes: int | None, *, printed: bool = False
+) -> Program:
+    """Choose devices and chunk, and compile; a chunk that nobody asked for is made to fit into the memory.
+
+    What is left beside a printed loop, or of few points, is compiled with little optimisation.
+    """
     mesh = Mesh(np.array(choose_devices(devices)), ("points",))
     fixed = asked is not None
     if asked is not None and asked < 1:
@@ -133,7 +139,7 @@ def prepare(traced: Traced, count: int, asked: int | None, devices: object, lane
     chunk = min(wanted, each if fixed else 2 ** (each - 1).bit_length())
     free = free_memory(mesh)
     while True:
-        program = with_chunk(traced, mesh, chunk)
+        program = with_chunk(traced, mesh, chunk, 1 if printed or count <= FEW else None)
         if fixed or chunk == 1:
             return program
         size = program.run.memory_analysis()
@@ -156,8 +162,8 @@ def _side_by_side(traced: Traced, mesh: Mesh, lanes: int | None) -> int:
     return min(lanes, max(2 ** max(share.bit_length() - 1, 0), 8))
 
 
-def with_chunk(traced: Traced, mesh: Mesh, chunk: int) -> Program:
-    """The program for a chunk, compiled."""
+def with_chunk(traced: Traced, mesh: Mesh, chunk: int, level: Level = None) -> Program:
+    """The program for a chunk, compiled at a level of optimisation."""
     each = sum(int(np.prod(r.shape)) * r.dtype.itemsize for r in traced.results.values())
     rounds = max(min(BUFFER_POINTS, BUFFER_BYTES // each) // chunk, 1)
     layout = Layout(mesh, chunk, rounds)
@@ -167,7 +173,8 @@ def with_chunk(traced: Traced, mesh: Mesh, chunk: int) -> Program:
     point = dict.fromkeys(traced.axes, jax.ShapeDtypeStruct(total, number_type(), sharding=spread))
     rounds_done = jax.ShapeDtypeStruct((), np.dtype(np.int32), sharding=everywhere)
     static = _Static(traced._replace(arrays=[], fingerprint=str), layout)
-    return Program(traced, layout, arrays, _jitted(static).lower(arrays, point, rounds_done).compile())
+    options = options_of(level, mesh.devices.flat[0].platform)
+    return Program(traced, layout, arrays, _jitted(static).lower(arrays, point, rounds_done).compile(options))
 
 
 @final

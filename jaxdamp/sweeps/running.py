@@ -226,7 +226,7 @@ class Computation:
                 warnings.catch_warnings(action="ignore"),  # of axes, which were given before
             ):
                 printed_trace = trace(printed, list(traced.axes), False)._replace(fingerprint=traced.fingerprint)
-                return prepare(printed_trace, count, self._chunk, self._devices, _lanes(printed))
+                return prepare(printed_trace, count, self._chunk, self._devices, _lanes(printed), printed=True)
         except NotImplementedError as error:
             if _of_machine(error):
                 warn(f"{error} This sweep goes on with the loop of XLA.")

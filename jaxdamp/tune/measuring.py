@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._jacobian import Mode, value_and_jacobian
 from jaxdamp._one_thread import usable_cores
-from jaxdamp._quickly import compiled_quickly
+from jaxdamp._quickly import FEW, Level, compiled_quickly
 from jaxdamp._types import Scalar
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.roads import WhiteRoad
@@ -27,7 +27,6 @@ from jaxdamp.tune.shape import ShapeNumbers
 from jaxdamp.vehicles import AbstractVehicle
 
 
-FEW = 64  # vehicles on white roads, up to which compiling takes most of the time of a search
 LANES = 16  # points side by side in one call of the compiled program
 FORWARD = 5  # parameters for each result, up to which forward derivatives of so many lanes are faster
 
@@ -117,16 +116,18 @@ class Measurement(eqx.Module):
         return eqx.tree_at(lambda measured: measured.ride, self, ride)
 
 
-def _is_small(
+def _level(
     measured: Measurement, free: FreeParameters, values: Float[Array, "*lanes free"], *_: object, **__: object
-) -> bool:
-    """Whether these are few vehicles on white roads."""
+) -> Level:
+    """Of optimisation: for few vehicles little, on white roads none."""
     ride = measured.ride
     road = ride.roads if isinstance(ride, ScenarioRide) else ride.road
-    return isinstance(road, WhiteRoad) and values[..., 0].size * max(len(measured.scenario_names), 1) <= FEW
+    if values[..., 0].size * max(len(measured.scenario_names), 1) > FEW:
+        return None
+    return 0 if isinstance(road, WhiteRoad) else 1
 
 
-@functools.partial(compiled_quickly, small=_is_small)
+@functools.partial(compiled_quickly, level=_level)
 def _values(measured: Measurement, free: FreeParameters, values: Float[Array, "*lanes free"]) -> Array:
     """All numbers, shape (*lanes, numbers), of vectors of values."""
 
@@ -137,7 +138,7 @@ def _values(measured: Measurement, free: FreeParameters, values: Float[Array, "*
     return one(values) if values.ndim == 1 else jax.vmap(one)(values)
 
 
-@functools.partial(compiled_quickly, small=_is_small)
+@functools.partial(compiled_quickly, level=_level)
 def _values_and_slopes(
     measured: Measurement, free: FreeParameters, values: Float[Array, "*lanes free"], of: tuple[str, ...], mode: Mode
 ) -> tuple[Array, Array]:

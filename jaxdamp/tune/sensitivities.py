@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._jacobian import with_jacobian
-from jaxdamp._quickly import compiled_quickly
+from jaxdamp._quickly import compiled_for_loops, compiled_quickly
 from jaxdamp._settings import part, with_defaults
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Number, Scalar, ScalarLike, Vector
@@ -119,7 +119,7 @@ def sensitivity(
     point = np.array([*np.asarray(free.values, float), *given.values()])
     measured = _measured(hatted, road, list(given), objective, free, run)
     names = [name for name in objective.units(vehicle) if name in objective.names]
-    compiled = compiled_quickly if is_white(first) else eqx.filter_jit
+    compiled = compiled_quickly if is_white(first) else compiled_for_loops
     values, slopes = _derivatives(measured, names, point, compiled)
     is_curve = np.array([is_hat(p.path, hatted) for p in free.owners] + [False] * len(given), bool)
     chosen = np.flatnonzero(~is_curve)

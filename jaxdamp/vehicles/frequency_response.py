@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Complex, Float
@@ -10,6 +9,7 @@ from jaxtyping import Array, ArrayLike, Complex, Float
 from jaxdamp import _checks
 from jaxdamp._limits import root
 from jaxdamp._matrices import solve
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.linear import LinearVehicle, as_linear
@@ -58,7 +58,7 @@ def frequency_response(
     return dict(zip(linear.channels, gains, strict=True))
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def _of_channels(
     linear: LinearVehicle, frequency: Float[Array, " frequencies"], delays: Float[Array, " wheels"] | None
 ) -> list[Complex[Array, "..."]]:
@@ -160,7 +160,7 @@ def spectral_rms(
     return dict(zip(linear.channels, rms, strict=True))
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def _rms_of_channels(
     linear: LinearVehicle,
     frequency: Float[Array, " frequencies"],
