@@ -8,6 +8,7 @@ from typing import Annotated
 import numpy as np
 
 from jaxdamp import _checks, export
+from jaxdamp._display import COMPRESSION, display
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.records import Reading
@@ -66,7 +67,7 @@ def export_command(
         law: a law as JSON, such as best_law.json of jaxdamp fit; or a vehicle, for c and fmu.
         to: adams, assetto-corsa, c, carsim, csv, fmu or matlab.
         part: whole, or controller for the controller of a vehicle alone, as c or fmu.
-        velocities: of a table, FROM:TO:POINTS [m/s]; those the law was fitted to, or -1:1:41.
+        velocities: of a table, FROM:TO:POINTS [m/s], positive in rebound; those the law was fitted to, or -1:1:41.
         show_units: units of a table as csv: SI, metric (N, mm/s), imperial (lbf, in/s), or a force and a velocity such
             as kgf,mm/s; --units means this too.
         show_sign: direction in which it counts positive: rebound-positive or compression-positive.
@@ -88,7 +89,8 @@ def export_command(
             _checks.refuse("part", f"be left out for {to}", part, "A table has a law alone.")
         damper = read_law("law", law)
         grid = _grid(damper, velocities)
-        screen.say(f"Velocities: {grid.size} from {grid[0]:g} to {grid[-1]:g} m/s, positive in rebound.")
+        low, high = sorted(grid[[0, -1]] * (-1.0 if display().sign == COMPRESSION else 1.0) + 0.0)  # no -0
+        screen.say(f"Velocities: {grid.size} from {low:g} to {high:g} m/s, positive in rebound.")  # or as it is shown
         written = write(damper, file, grid)
     files: Sequence[Path] = written if isinstance(written, list) else [written]
     screen.points([f"written: {each}" for each in files])

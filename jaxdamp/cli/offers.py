@@ -89,7 +89,7 @@ WRITTEN = {  # by the name of the option, where its type does not say it
     ),
     "priors": Written(SPANS, "NAME=MEAN:DEVIATION"),
     "columns": Written(words.named(words.column, like="stroke=..."), "NAME=COLUMN", "time=t_s,stroke=1,velocity=none"),
-    "command": Written(words.commands, "PATTERN=NUMBER"),
+    "command": Written(words.commands, "NUMBER, PATTERN=NUMBER or NAME"),
     "sensor": Written(
         words.named_numbers(SENSOR, "stroke:offset,delay=0.001"),
         "NAME:NUMBER,...",

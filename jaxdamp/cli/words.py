@@ -79,14 +79,21 @@ def named(
     return read
 
 
-def commands(option: str, given: Sequence[str]) -> dict[str, float]:
-    """What was set on the damper, by name or pattern of the records.
+def commands(option: str, given: Sequence[str]) -> float | str | dict[str, float]:
+    """What was set on the damper: one number, the name of a setting, or numbers by name or pattern of the records.
 
+    >>> commands("command", ["0.5"]), commands("command", ["current"])
+    (0.5, 'current')
     >>> commands("command", ["*_0.5A=0.5,*_1A=1"])
     {'*_0.5A': 0.5, '*_1A': 1.0}
     """
-    like = "'*_0.5A=0.5'"
-    return named(float, f"read like {like}", like)(option, given)
+    like = "0.5, '*_0.5A=0.5,*_1A=1' or the name of a setting"
+    if len(given) > 1 or re.search("[=,]", given[0]):
+        return named(float, f"read like {like}", like)(option, given)
+    try:
+        return float(given[0])
+    except ValueError:
+        return given[0].strip()
 
 
 def numbers_in_order(option: str, given: Sequence[str]) -> list[float]:

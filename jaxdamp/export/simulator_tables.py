@@ -1,13 +1,14 @@
 """A law as a force-velocity table, and as the table of a vehicle simulator, in its units and with its sign."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from jaxdamp import _checks
-from jaxdamp._display import display
+from jaxdamp._display import COMPRESSION, display
 from jaxdamp._field_types import check_module
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import VectorLike
@@ -39,12 +40,13 @@ def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vector
         ValueError: velocities that do not increase, a folder that does not exist, a law without a settled force at any
             of the velocities.
     """
-    table = settled_table(law, velocities, "to_csv(law, path, velocities)")
     shown = display()
+    table = settled_table(law, velocities, "to_csv(law, path, velocities)", turned=shown.sign == COMPRESSION)
     units = shown.of("m/s", signed=True), shown.of("N", signed=True)
     points = sorted(zip(units[0](table.velocity), units[1](table.force), strict=True))
-    rows = [f"{float(v)!r},{float(f)!r}" for v, f in points]
-    comments = [f"# {shown.words(line)}" for line in table.comments]
+    rows = [f"{float(v) + 0.0!r},{float(f) + 0.0!r}" for v, f in points]  # no -0.0
+    about, *others = table.comments  # the numbers of a law are in SI whatever is shown
+    comments = [f"# {about}", *(f"# {shown.words(line)}" for line in others)]
     heading = ",".join(f"{name} [{unit.unit}]" for name, unit in zip(("velocity", "force"), units, strict=True))
     written = write_whole(path, "\n".join([*comments, heading, *rows]) + "\n")
     warn_of_rows(written, table)
@@ -60,8 +62,11 @@ class SettledTable(NamedTuple):
     left_out: str  # the rows that were left out and why; empty if there are none
 
 
-def settled_table(law: AbstractDamper, velocities: VectorLike, call: str) -> SettledTable:
-    """The force at constant velocity once the states have settled, as `to_csv` writes it."""
+def settled_table(law: AbstractDamper, velocities: VectorLike, call: str, *, turned: bool = False) -> SettledTable:
+    """The force at constant velocity once the states have settled, as `to_csv` writes it.
+
+    Its comments are on numbers that are positive in rebound, or in compression if they are turned.
+    """
     check_module("law", law, (AbstractDamper,), call)
     velocity = np.asarray(velocities, dtype=float)
     _checks.finite("velocities", velocity)
@@ -73,7 +78,7 @@ def settled_table(law: AbstractDamper, velocities: VectorLike, call: str) -> Set
         what = f"{type(law).__name__}. {curve.note.removesuffix('.')}"
         _checks.refuse("law", "have a force at constant velocity", what, remedy)
     comments = [
-        f"law: {law!r}",
+        f"law, its numbers in SI and positive in rebound: {law!r}",
         "velocity is positive in extension (rebound), force is positive when it resists extension",
     ]
     states = law.initial_state().size
@@ -82,9 +87,9 @@ def settled_table(law: AbstractDamper, velocities: VectorLike, call: str) -> Set
             f"quasi-static: force at constant velocity; the hysteresis of the law's {states} state(s) is not in here"
         )
     if curve.note:
-        comments.append(f"rows left out: {curve.note}")
+        comments.append(f"rows left out{', with rebound counted positive' * turned}: {curve.note}")
     settled = velocity[curve.settled]
-    comments += _range_lines(law, settled)
+    comments += _range_lines(law, settled, turned=turned)
     return SettledTable(settled, np.asarray(curve.force)[curve.settled], comments, curve.note)
 
 
@@ -94,16 +99,19 @@ def warn_of_rows(written: Path, table: SettledTable) -> None:
         warn(f"{written.name}: rows left out. {table.left_out}")
 
 
-def _range_lines(law: AbstractDamper, velocity: np.ndarray) -> list[str]:
+def _range_lines(law: AbstractDamper, velocity: np.ndarray, *, turned: bool) -> list[str]:
     """Comments on the fitted range of the law and on the rows outside it."""
-    lines = [] if law.fitted_to is None else [f"fitted to: {law.fitted_to.words()}"]
+    lines, fitted = [], law.fitted_to
+    if fitted is not None:
+        ends = {q.name: (-q.limits[1], -q.limits[0]) for q in fitted.known() if display().signed(q.name)}
+        lines.append(f"fitted to: {(replace(fitted, **ends) if turned else fitted).words()}")
     outside = extrapolated(law, velocity)
     if not outside.any():
         return lines
     if outside.all():
         return [*lines, "extrapolated: all rows lie beyond the velocities that the law was fitted to"]
-    measured = velocity[~outside]
-    where = f"rows below {measured[0]:.6g} m/s and above {measured[-1]:.6g} m/s"
+    low, high = sorted((-1.0 if turned else 1.0) * velocity[~outside][[0, -1]])
+    where = f"rows below {low:.6g} m/s and above {high:.6g} m/s"
     return [*lines, f"extrapolated: {where}, {np.count_nonzero(outside)} of {velocity.size}, beyond all records"]
 
 

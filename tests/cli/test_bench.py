@@ -142,6 +142,19 @@ def test_settings_stated_on_the_command_line(folder: Path, tmp_path: Path) -> No
     assert header == "quantity,unit,1,2,change [%]"
 
 
+@pytest.mark.parametrize(
+    ("words", "columns"),
+    [(("--command", "0.5"), "0.5"), (("--settings", "*mm_{speed}Hz", "--command", "speed"), "1,2")],
+)
+def test_one_command_for_all_records_or_that_of_a_setting(
+    words: tuple[str, ...], columns: str, folder: Path, tmp_path: Path
+) -> None:
+    files = [folder / f"10mm_{speed}Hz.csv" for speed in (1, 2)]
+    jaxdamp("bench", *files, *words, "--velocities", "0.05", "--out", tmp_path / "out")
+    (header, *_) = (tmp_path / "out" / "tables" / "velocities.csv").read_text().splitlines()
+    assert header.startswith(f"quantity,unit,{columns}")
+
+
 def test_records_are_compared_by_a_setting_of_the_manifest(folder: Path, tmp_path: Path) -> None:
     manifest = tmp_path / "bench.toml"
     manifest.write_text('sign = "rebound-positive"\nsettings = "*mm_{speed}Hz"\n')
@@ -162,7 +175,9 @@ def test_records_are_compared_by_a_setting_of_the_manifest(folder: Path, tmp_pat
         (("--between", "2"), "Option --between must read like 2:10"),
         (("--between", "50:60"), "The beginning in --between must leave some of the record"),
         (("--filter", "400"), "Option --filter must be less than 0.45 times the sampling rate"),
-        (("--command", "warm"), "Option --command must read like"),
+        (("--command", "warm"), "Option --command must name a setting that is a number"),
+        (("--command", "*_1Hz=warm"), "Option --command must read like 0.5, '*_0.5A=0.5,*_1A=1' or the name of a"),
+        (("--command", "0.5,1"), "Option --command must read like 0.5"),
         (("--velocities", "fast"), "Option --velocities must read like"),
         (("--velocities", "-1"), "Option --velocities must be positive"),
     ],

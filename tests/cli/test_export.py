@@ -63,6 +63,19 @@ def test_a_table_in_the_units_and_the_sign_of_a_shop(law: Path) -> None:
     assert "must be left out for carsim" in refused(law.parent, "export", law, "--to", "carsim", *shop)
 
 
+def test_what_is_said_of_a_table_agrees_with_its_rows(law: Path) -> None:
+    fitted = law.parent / "fitted.json"
+    to_json(with_fitted_range(LAW, FittedRange(velocity=(-0.128, 0.255), force=(-100.0, 600.0))), fitted)
+    words = ("--to", "csv", "--velocities", "-0.254:0.508:7", "--show-sign", "compression-positive")
+    said = " ".join(jaxdamp("export", fitted, *words, "--units", "imperial").output.split())
+    assert "Velocities: 7 from -20 to 10 in/s, positive in compression." in said
+    text = (law.parent / "fitted.csv").read_text()
+    assert text.splitlines()[-7].startswith("-20.0,") and text.splitlines()[-3] == "0.0,0.0"
+    assert "# law, its numbers in SI and positive in rebound: Bilinear(rebound_rate=2600.0" in text
+    assert "# fitted to: velocity -10 to 5.04 in/s, force -135 to 22.5 lbf\n" in text
+    assert "# extrapolated: rows below -10 in/s and above 5 in/s, 3 of 7, beyond all records" in text
+
+
 def test_refusals(law: Path) -> None:
     folder = law.parent
     assert "Option --to must be one of" in refused(folder, "export", law, "--to", "adam")
