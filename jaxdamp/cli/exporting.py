@@ -9,12 +9,14 @@ import numpy as np
 
 from jaxdamp import _checks, export
 from jaxdamp._display import COMPRESSION, display
+from jaxdamp._words import first_upper
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.records import Reading
 from jaxdamp.cli.riding import USUAL, parse_road
-from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, read_module
+from jaxdamp.cli.vehicle_words import commanded, parse_vehicle, read_law, read_module
 from jaxdamp.dampers import AbstractDamper
+from jaxdamp.export.simulator_tables import command_words
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -57,6 +59,7 @@ def export_command(
     to: str,
     part: str = "whole",
     velocities: str | None = None,
+    command: float | None = None,
     show_units: str | None = None,
     show_sign: str | None = None,
     output: OneFile,
@@ -68,6 +71,7 @@ def export_command(
         to: adams, assetto-corsa, c, carsim, csv, fmu or matlab.
         part: whole, or controller for the controller of a vehicle alone, as c or fmu.
         velocities: of a table, FROM:TO:POINTS [m/s], positive in rebound; those the law was fitted to, or -1:1:41.
+        command: of a table, what is set on the damper, such as clicks or a coil current; that of the law if left out.
         show_units: units of a table as csv: SI, metric (N, mm/s), imperial (lbf, in/s), or a force and a velocity such
             as kgf,mm/s; --units means this too.
         show_sign: direction in which it counts positive: rebound-positive or compression-positive.
@@ -82,15 +86,19 @@ def export_command(
     if to in PROGRAMS:
         if velocities is not None:
             _checks.refuse("velocities", f"be left out for {to}", velocities, "It has the law itself, not a table.")
+        if command is not None:
+            _checks.refuse("command", f"be left out for {to}", command, "It has the command itself, to be set there.")
         kinds, remedy = (AbstractDamper, AbstractVehicle), "Give the JSON of a law or of a vehicle."
         written = write(read_module("law", law, kinds, "a law or a vehicle", remedy), file, part=part)
     else:
         if part != "whole":
             _checks.refuse("part", f"be left out for {to}", part, "A table has a law alone.")
-        damper = read_law("law", law)
+        damper = commanded(read_law("law", law), command)
         grid = _grid(damper, velocities)
         low, high = sorted(grid[[0, -1]] * (-1.0 if display().sign == COMPRESSION else 1.0) + 0.0)  # no -0
         screen.say(f"Velocities: {grid.size} from {low:g} to {high:g} m/s, positive in rebound.")  # or as it is shown
+        if at := command_words(damper):
+            screen.say(f"{first_upper(at)}; --command sets another.")
         written = write(damper, file, grid)
     files: Sequence[Path] = written if isinstance(written, list) else [written]
     screen.points([f"written: {each}" for each in files])

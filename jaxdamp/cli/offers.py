@@ -80,7 +80,7 @@ SPANS = words.named(words.span, "be a number, or two as LOWER:UPPER")
 SENSOR = {"gain": 1.0, "offset": 0.0, "lag": 0.0, "delay": 0.0, "high_pass": None}
 GUIDE: dict[str, float | None] = dict.fromkeys(("friction", "stiffness", "damping", "friction_velocity", "ahead"))
 
-WRITTEN = {  # by the name of the option, where its type does not say it
+WRITTEN = {  # by the name of the option, or by function and name, where its type does not say it
     "bound": Written(words.named(words.bound, ENDS), "NAME=LOWER:UPPER", "rate=1000:4000, rate=5lbf s/in:25lbf s/in"),
     "limit": Written(
         words.named(words.limit, ENDS),
@@ -89,7 +89,7 @@ WRITTEN = {  # by the name of the option, where its type does not say it
     ),
     "priors": Written(SPANS, "NAME=MEAN:DEVIATION"),
     "columns": Written(words.named(words.column, like="stroke=..."), "NAME=COLUMN", "time=t_s,stroke=1,velocity=none"),
-    "command": Written(words.commands, "NUMBER, PATTERN=NUMBER or NAME"),
+    "bench.read command": Written(words.commands, "NUMBER, PATTERN=NUMBER or NAME"),
     "sensor": Written(
         words.named_numbers(SENSOR, "stroke:offset,delay=0.001"),
         "NAME:NUMBER,...",

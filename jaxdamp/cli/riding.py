@@ -14,8 +14,15 @@ from jaxdamp.cli.controlling import Controlling
 from jaxdamp.cli.early import refuse_road
 from jaxdamp.cli.jobs import Output, job, with_step_warnings, without_range_warnings, write_tables
 from jaxdamp.cli.options import Call
-from jaxdamp.cli.vehicle_words import law_of, parse_vehicle, read_baseline, read_law
+from jaxdamp.cli.vehicle_words import (
+    law_of,
+    parse_vehicle,
+    read_baseline,
+    read_law,
+    with_dampers_at,
+)
 from jaxdamp.dampers import AbstractDamper
+from jaxdamp.export.simulator_tables import command_words
 from jaxdamp.parameters import match_paths, named_parameters
 from jaxdamp.report import Table, axles_sentence, notes_of, ride_report, ride_tables, ride_verdict
 from jaxdamp.roads import AbstractRoad, WhiteRoad
@@ -138,6 +145,7 @@ def ride(
     road: str = "iso:C",
     *,
     start: Path | None = None,
+    command: float | None = None,
     driving: Driving,
     how: Annotated[Call, "simulation.simulate"],
     controlling: Controlling,
@@ -149,10 +157,11 @@ def ride(
     The vehicle has its own dampers, or the law of --start at every one.
 
     Arguments:
+        command: what is set on the dampers, such as clicks or a coil current; that of their laws if left out.
         baseline: to compare with: another law, or another vehicle, as JSON.
     """
     law, make = None if start is None else read_law("start", start), parse_vehicle(vehicle)
-    own, name = make(law), "vehicle" if law is None else "law"
+    own, name = with_dampers_at(make(law), command), "vehicle" if law is None else "law"
     cars = {name: controlling.of(own, law)}
     if baseline is not None or controlling.controller is not None:  # at its own command
         cars = {"baseline": own if baseline is None else read_baseline(baseline, own)} | cars
@@ -160,6 +169,9 @@ def ride(
     if not isinstance(surface, AbstractRoad):
         refuse_road(road)
     run["duration"] = driving.duration or surface.duration or USUAL  # an iso road in full
+    passive = {name: command_words(car) for name, car in cars.items() if car.passive is car}
+    commands = [f"{name}: {at}." for name, at in passive.items() if at]
+    screen.points(commands)
     screen.points(unusual(road, driving.speed), style="yellow")
     with job(screen, "ride", output) as work:
         responses: dict[str, Response] = {}
@@ -184,7 +196,7 @@ def ride(
             _write(draft, laws, responses)
             write_tables(draft, tables)
             plots.animation(responses, draft / "animation.html", title=title)
-        work.page(ride_report, responses, title=title, laws=laws, remarks=remarks)
+        work.page(ride_report, responses, title=title, laws=laws, remarks=[*commands, *remarks])
 
 
 def show_ride(screen: Screen, responses: Mapping[str, Response]) -> dict[str, Table]:

@@ -12,7 +12,7 @@ from jaxdamp._tables import Contents
 from jaxdamp._traced import equal
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.early import EXAMPLE, FROM_FIT, read_json, read_vehicle
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers import AbstractDamper, check_commands, takes_command, with_command
 from jaxdamp.identify import laws_table
 from jaxdamp.parameters import get, matching, replace
 from jaxdamp.report import Column, Table
@@ -121,6 +121,32 @@ def with_law(vehicle: AbstractVehicle, law: AbstractDamper) -> AbstractVehicle:
     """
     for path in damper_places(vehicle):
         vehicle = eqx.tree_at(lambda car, path=path: get(car, path), vehicle, law)
+    return vehicle
+
+
+def commanded(law: AbstractDamper, command: float | None) -> AbstractDamper:
+    """A law at the command of the option --command; at its own without one.
+
+    Raises:
+        ValueError: a law that takes no command, or not this one.
+    """
+    if command is None:
+        return law
+    check_commands("command", law, command)
+    return with_command(law, command)
+
+
+def with_dampers_at(vehicle: AbstractVehicle, command: float | None) -> AbstractVehicle:
+    """The vehicle with its dampers that take a command at that of the option --command; itself without one.
+
+    Raises:
+        ValueError: no damper of the vehicle takes a command, or one not this one.
+    """
+    if command is None:
+        return vehicle
+    laws = {path: get(vehicle, path) for path in damper_places(vehicle)}
+    for path, law in ({path: law for path, law in laws.items() if takes_command(law)} or laws).items():
+        vehicle = eqx.tree_at(lambda car, path=path: get(car, path), vehicle, commanded(law, command))
     return vehicle
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxdamp.cli.exporting import PROGRAMS, TABLES
-from jaxdamp.dampers import Bilinear, FittedRange, with_fitted_range
+from jaxdamp.dampers import Bilinear, FittedRange, Linear, Scheduled, with_fitted_range
 from jaxdamp.export import to_csv, to_json
 from jaxdamp.roads import sine
 from jaxdamp.vehicles.presets import quarter_car_000
@@ -74,6 +74,23 @@ def test_what_is_said_of_a_table_agrees_with_its_rows(law: Path) -> None:
     assert "# law, its numbers in SI and positive in rebound: Bilinear(rebound_rate=2600.0" in text
     assert "# fitted to: velocity -10 to 5.04 in/s, force -135 to 22.5 lbf\n" in text
     assert "# extrapolated: rows below -10 in/s and above 5 in/s, 3 of 7, beyond all records" in text
+
+
+def test_a_table_of_a_law_with_a_command_says_at_which(law: Path) -> None:
+    folder = law.parent
+    clicks = Scheduled((Linear(900.0), Linear(1500.0)), levels=[2.0, 10.0], command=2.0)
+    to_json(clicks, folder / "clicks.json")
+    assert (
+        "At command 2 of 2 to 10; --command sets another."
+        in jaxdamp("export", folder / "clicks.json", "--to", "adams").output
+    )
+    words = ("export", folder / "clicks.json", "--to", "csv", "--velocities", "-1:1:3", "--command")
+    assert "At command 6 of 2 to 10;" in jaxdamp(*words, 6).output
+    text = (folder / "clicks.csv").read_text()
+    assert "# at command 6 of 2 to 10\n" in text and text.endswith("\n1.0,1200.0\n")
+    assert "Option --command must stay between the levels 2 and 10" in refused(folder, *words, 20, "--replace")
+    assert "Option --command must be left out" in refused(folder, "export", law, "--to", "csv", "--command", "6")
+    assert "Option --command must be left out for c" in refused(folder, "export", law, "--to", "c", "--command", "6")
 
 
 def test_refusals(law: Path) -> None:

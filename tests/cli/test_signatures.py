@@ -144,7 +144,7 @@ def test_the_declared_lists_name_arguments_that_are_there() -> None:
         assert set(reasons) <= there and all(reasons.values()), owner
     names = {leaf.option for target in COMMANDS.values() for leaf in options.leaves(target)}
     python = {leaf.argument.name for target in COMMANDS.values() for leaf in options.leaves(target)}
-    assert {key.split()[-1] for key in offers.TEXTS} | set(offers.WRITTEN) | set(offers.SHORT) | set(
+    assert {key.split()[-1] for key in [*offers.TEXTS, *offers.WRITTEN]} | set(offers.SHORT) | set(
         offers.SHARED
     ) <= names
     assert {key.split()[-1] for key in offers.NAMES} <= python
