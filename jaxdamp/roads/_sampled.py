@@ -42,6 +42,10 @@ class AbstractProcess(eqx.Module):
     def draw(self, seed: int | Array, count: int) -> Float[Array, " samples"]:
         """So many heights [m]."""
 
+    @abc.abstractmethod
+    def redraw(self, samples: Float[Array, " samples"], seed: int) -> Float[Array, " samples"]:
+        """Other heights [m], alike for equal `samples`, independent for independent ones."""
+
 
 @final
 class SampledRoad(AbstractRoad):
@@ -107,10 +111,13 @@ class SampledRoad(AbstractRoad):
         return 0.0, length if self.speed is None else length / self.speed
 
     def reseeded(self, seed: int) -> "SampledRoad | None":
-        """Another realisation of a random road whose process is known."""
+        """Another realisation of a random road whose process is known.
+
+        Equal tracks stay equal, independent ones independent.
+        """
         if self.process is None:
             return None
-        return eqx.tree_at(lambda road: road.samples, self, self.process.draw(seed, len(self.samples))[:, None])
+        return eqx.tree_at(lambda road: road.samples, self, self.process.redraw(self.samples[:, 0], seed)[:, None])
 
     def _refuse_outside(self, time: SignalLike) -> None:
         times, grid, duration = _checks.concrete(time), self.grid, self.duration

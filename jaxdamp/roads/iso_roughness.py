@@ -184,14 +184,14 @@ class Iso8608(AbstractRoad):
 
         Equal tracks stay equal, independent ones independent.
         """
-        phase, size = _shifted(self.phase, self.relative_amplitude, uniform(seed, (2, self.phase.size)))
+        phase, size = shifted(self.phase, self.relative_amplitude, uniform(seed, (2, self.phase.size)))
         if self.amplitudes == "fixed":
             return eqx.tree_at(lambda road: road.phase, self, phase)
         return eqx.tree_at(lambda road: (road.phase, road.relative_amplitude), self, (phase, size))
 
 
 @jax.jit
-def _shifted(
+def shifted(
     phase: Float[Array, " waves"], size: Float[Array, " waves"], drawn: Float[Array, "2 waves"]
 ) -> tuple[Float[Array, " waves"], Float[Array, " waves"]]:
     """Phases [rad] and relative amplitudes whose probabilities are shifted by numbers between 0 and 1."""

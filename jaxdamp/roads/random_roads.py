@@ -147,10 +147,27 @@ class FilteredNoise(AbstractProcess):
         """So many heights [m]."""
         return _filtered(self.deviation, self.correlation, normal(seed, (count,)))
 
+    def redraw(self, samples: Float[Array, " samples"], seed: int) -> Float[Array, " samples"]:
+        """Other heights [m]: the probabilities of the noise are shifted."""
+        return _redrawn(self.deviation, self.correlation, samples, uniform(seed, samples.shape))
+
 
 @jax.jit
 def _filtered(deviation: Scalar, correlation: Scalar, noise: Float[Array, " samples"]) -> Float[Array, " samples"]:
     return deviation * autoregressive(noise, correlation)
+
+
+@jax.jit
+def _redrawn(
+    deviation: Scalar, correlation: Scalar, samples: Float[Array, " samples"], shift: Float[Array, " samples"]
+) -> Float[Array, " samples"]:
+    """Filtered noise whose probabilities are those of the noise behind `samples`, shifted by numbers from 0 to 1."""
+    u = samples / deviation
+    innovation = jnp.sqrt((1.0 - correlation) * (1.0 + correlation))
+    noise = jnp.concatenate([u[:1], (u[1:] - correlation * u[:-1]) / innovation])
+    least = float(jnp.finfo(u.dtype).eps)  # at 0 and 1 the noise is infinite
+    probability = jnp.clip((jax.scipy.special.ndtr(noise) + shift) % 1.0, least, 1.0 - least)
+    return _filtered(deviation, correlation, jax.scipy.special.ndtri(probability))
 
 
 def iso8608_filtered(

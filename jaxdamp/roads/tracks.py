@@ -12,7 +12,7 @@ from jaxdamp._random import rayleigh, sign, uniform
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
 from jaxdamp.roads._composed import AbstractOnSeveralRoads, same_columns
 from jaxdamp.roads.base import AbstractRoad, Columns
-from jaxdamp.roads.iso_roughness import Iso8608
+from jaxdamp.roads.iso_roughness import Iso8608, shifted
 
 
 # K_v(x) = int_0^inf exp(-x cosh t) cosh(v t) dt by the trapezoidal rule. The error at this step is below 1e-13 up to
@@ -94,10 +94,17 @@ class TwoTrack(AbstractOnSeveralRoads):
 
     def reseeded(self, seed: int) -> AbstractRoad | None:
         """Other tracks, which are as coherent as these."""
-        left = self.roads[0]
-        if self.track_width is None or not isinstance(left, Iso8608) or left.amplitudes == "fixed":
+        left, right = self.roads
+        if self.track_width is None or not isinstance(left, Iso8608) or not isinstance(right, Iso8608):
             return super().reseeded(seed)
-        return two_track(left.reseeded(seed), track_width=self.track_width, seed=seed)
+        if left.amplitudes == "fixed":
+            return super().reseeded(seed)
+        gamma, remainder = _gamma(left, self.track_width), _others(seed, left.phase.size)
+        rest = _parts_of(right.phase, right.relative_amplitude) - _parts_of(left.phase, gamma * left.relative_amplitude)
+        turned, scaled = _polar(rest)
+        phase, size = shifted(turned, scaled / jnp.sqrt((1.0 - gamma) * (1.0 + gamma)), remainder)
+        other = left.reseeded(seed)
+        return TwoTrack((other, _coherent(other, gamma, phase, size)), self.track_width)
 
 
 def two_track(
@@ -168,15 +175,40 @@ def two_track(
 
 def _beside(left: Iso8608, track_width: ScalarLike, seed: int | Array) -> Iso8608:
     """The right-hand track of a random road."""
-    # at 1, which gamma reaches only for a vanishing track, arccos and the square root have no slope
-    gamma = coherency(left.spatial_frequency, track_width, left.waviness)
-    gamma = jnp.minimum(gamma, 1.0 - 4.0 * float(jnp.finfo(gamma.dtype).eps))
+    gamma = _gamma(left, track_width)
     if left.amplitudes == "fixed":
         return eqx.tree_at(lambda road: road.phase, left, left.phase + sign(seed, gamma.shape) * jnp.arccos(gamma))
-    # numbers that `iso8608` does not use, so that the same seed may be given to both
-    turn, above = uniform(seed, (4, gamma.size))[2:]
-    shared, rest = gamma * left.relative_amplitude, jnp.sqrt((1.0 - gamma) * (1.0 + gamma)) * rayleigh(above)
-    real = shared * jnp.cos(left.phase) + rest * jnp.cos(2.0 * jnp.pi * turn)
-    imaginary = shared * jnp.sin(left.phase) + rest * jnp.sin(2.0 * jnp.pi * turn)
-    drawn = (jnp.arctan2(imaginary, real), jnp.sqrt(real**2 + imaginary**2))
+    turn, above = _others(seed, gamma.size)
+    return _coherent(left, gamma, 2.0 * jnp.pi * turn, rayleigh(above))
+
+
+def _gamma(left: Iso8608, track_width: ScalarLike) -> Float[Array, " lines"]:
+    """The coherency of the tracks at the cosines of a road."""
+    # at 1, which gamma reaches only for a vanishing track, arccos and the square root have no slope
+    gamma = coherency(left.spatial_frequency, track_width, left.waviness)
+    return jnp.minimum(gamma, 1.0 - 4.0 * float(jnp.finfo(gamma.dtype).eps))
+
+
+def _others(seed: int | Array, lines: int) -> Float[Array, "2 lines"]:
+    """Numbers from 0 to 1 that `iso8608` and its roads do not use, so that the same seed may be given to both."""
+    return uniform(seed, (4, lines))[2:]
+
+
+def _parts_of(phase: Float[Array, " lines"], size: Float[Array, " lines"]) -> Float[Array, "2 lines"]:
+    """The real and the imaginary part of cosines."""
+    return jnp.stack([size * jnp.cos(phase), size * jnp.sin(phase)])
+
+
+def _polar(parts: Float[Array, "2 lines"]) -> tuple[Float[Array, " lines"], Float[Array, " lines"]]:
+    """Phases [rad] and sizes of cosines."""
+    real, imaginary = parts
+    return jnp.arctan2(imaginary, real), jnp.sqrt(real**2 + imaginary**2)
+
+
+def _coherent(
+    left: Iso8608, gamma: Float[Array, " lines"], phase: Float[Array, " lines"], size: Float[Array, " lines"]
+) -> Iso8608:
+    """A track whose cosines are gamma times those of `left` and sqrt(1 - gamma^2) times others."""
+    shared, rest = gamma * left.relative_amplitude, jnp.sqrt((1.0 - gamma) * (1.0 + gamma)) * size
+    drawn = _polar(_parts_of(left.phase, shared) + _parts_of(phase, rest))
     return eqx.tree_at(lambda road: (road.phase, road.relative_amplitude), left, drawn)

@@ -1,3 +1,5 @@
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -105,6 +107,13 @@ def test_duration_needs_a_known_speed():
         jax.grad(lambda v: jnp.sum(iso8608_filtered("C", v, 10.0, seed=0).height(jnp.zeros(1))))(20.0)
 
 
-def test_a_filtered_road_is_drawn_again_as_with_that_seed():
-    road = iso8608_filtered("C", speed=20.0, duration=5.0, seed=1)
-    assert road.reseeded(2) == iso8608_filtered("C", speed=20.0, duration=5.0, seed=2)
+def test_filtered_roads_drawn_again_stay_independent_and_in_their_distribution():
+    roads = [iso8608_filtered("C", 20.0, seed=seed, length=4000.0, spacing=5.0) for seed in (1, 2)]
+    drawn: list[Any] = [road.reseeded(seed) for road, seed in zip((*roads, roads[0]), (3, 3, 4), strict=True)]
+    again: Any = iso8608_filtered("C", 20.0, seed=1, length=4000.0, spacing=5.0).reseeded(3)
+    np.testing.assert_array_equal(drawn[0].samples, again.samples)
+    # 801 samples, increments nearly free of correlation: 4 standard errors
+    increments = [np.diff(road.samples[:, 0]) for road in (*roads, *drawn)]
+    np.testing.assert_allclose(np.corrcoef(increments), np.eye(5), atol=4 / np.sqrt(800))
+    step = np.sqrt(2 * VARIANCE * -np.expm1(-2 * np.pi * N1 * 5.0))
+    assert all(stats.kstest(each / step, "norm").pvalue > 1e-4 for each in increments)

@@ -1,5 +1,6 @@
 from typing import Any
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -50,6 +51,18 @@ def test_random_tracks_have_the_spectrum_and_coherency_on_average_also_drawn_ane
     assert abs(np.corrcoef(drawn.roads[0].relative_amplitude, road.roads[0].relative_amplitude)[0, 1]) < 0.08
     same: Any = two_track(road.roads[0], road.roads[0]).reseeded(8)
     np.testing.assert_array_equal(same.roads[0].relative_amplitude, same.roads[1].relative_amplitude)
+
+
+@pytest.mark.parametrize("amplitudes", ["random", "fixed"])
+def test_tracks_of_independent_surfaces_stay_independent_drawn_anew(amplitudes):
+    roads = [
+        two_track(iso8608("C", SPEED, seed=s, amplitudes=amplitudes), track_width=TRACK, seed=s + 5) for s in (1, 2)
+    ]
+    drawn: list[Any] = [road.reseeded(seed) for road, seed in zip((*roads, roads[0]), (3, 3, 4), strict=True)]
+    lines = [np.asarray(r.relative_amplitude) * np.exp(1j * np.asarray(r.phase)) for d in drawn for r in d.roads]
+    across = np.abs(lines @ np.conj(lines).T / lines[0].size)[np.kron(np.eye(3), np.ones((2, 2))) == 0]
+    assert np.max(across) < 4 / np.sqrt(lines[0].size)
+    assert eqx.tree_equal(roads[0].reseeded(3), drawn[0])
 
 
 def test_neither_track_leads():
