@@ -136,9 +136,11 @@ def _noted(run: "BenchRun", note: str, **changes: object) -> "BenchRun":
 
 
 def _cut(run: "BenchRun", part: np.ndarray | slice, note: str) -> "BenchRun":
-    """The samples of a part."""
+    """The samples of a part, in which a command that varies besides may be held."""
     names = [name for name in ("time", *CHANNELS, *BESIDE) if getattr(run, name) is not None]
-    return _noted(run, note, **{name: getattr(run, name)[part] for name in names})
+    cut = _noted(run, note, **{name: getattr(run, name)[part] for name in names})
+    command = cut.command_channel
+    return cut if command is None or np.ptp(command) > 0.0 else cut.held_at(command[0])
 
 
 def _align(run: "BenchRun", delay: float) -> "BenchRun":

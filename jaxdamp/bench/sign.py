@@ -8,6 +8,7 @@ or taken as rebound positive and said so.
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
@@ -16,6 +17,7 @@ from jaxdamp.bench.motion import Samples, cycle_instants, cycle_works
 
 SIGNS = ("rebound-positive", "compression-positive")
 FORCE_SIGNS = ("same", "opposite")
+LEAST_WAY = 0.3  # of the range of a stroke, there and back
 LEAST_LOSS = 0.05  # of a viscous damper's work, from which the sign of the work is clear
 OPPOSITE = "force and stroke of the file have opposite signs"  # begins the note of a record whose force was turned
 
@@ -41,16 +43,37 @@ def loss_fraction(time: Samples, stroke: Samples, force: Samples) -> tuple[float
     """Median work per cycle [J] and its ratio to that of a viscous damper with the same RMS force and stroke.
 
     The ratio W / (2 π σ_F σ_x), over full cycles, is 1 for a viscous damper on a sine, 0 for a spring, -1 if force or
-    stroke has the wrong sign.
+    stroke has the wrong sign. In a record without a full cycle the way there and back counts; where the stroke does not
+    come back, a spring or a gas force may give energy: the work is then NaN and the ratio 0.
     """
     instants, power = cycle_instants(time, stroke), force * np.gradient(stroke, time)
-    part = np.ones(len(time), dtype=bool)
-    if len(instants) > 1:
-        work, part = float(np.median(cycle_works(time, power, instants))), (time >= instants[0]) & (time < instants[-1])
-    else:
-        work = float(np.trapezoid(power, time))
+    if len(instants) < 2:
+        instants = _there_and_back(time, stroke)
+    if len(instants) < 2:
+        return np.nan, 0.0
+    work, part = float(np.median(cycle_works(time, power, instants))), (time >= instants[0]) & (time < instants[-1])
     scale = 2 * np.pi * float(np.std(force[part]) * np.std(stroke[part]))
     return work, work / scale if scale > 0 else 0.0
+
+
+def _there_and_back(time: Samples, stroke: Samples) -> Float[np.ndarray, " instants"]:
+    """First and last instant [s] at the same stroke, that of the middle or of an end of the record; none if it is open.
+
+    The way between them must be `LEAST_WAY` of the range, which noise is not.
+    """
+    ways = [np.zeros(0)]
+    for level in (0.5 * (stroke.min() + stroke.max()), stroke[0], stroke[-1]):
+        x = stroke - level
+        at = np.flatnonzero((x[:-1] <= 0) != (x[1:] <= 0))
+        instants = time[at] - x[at] * (time[at + 1] - time[at]) / (x[at + 1] - x[at])
+        if len(at) and level == stroke[0]:
+            instants = np.concatenate([time[:1], instants])
+        if len(at) and level == stroke[-1]:
+            instants = np.concatenate([instants, time[-1:]])
+        inside = stroke[(time >= instants[0]) & (time <= instants[-1])] if len(instants) > 1 else stroke[:0]
+        if inside.size and np.ptp(inside) >= LEAST_WAY * np.ptp(stroke):
+            ways.append(instants[[0, -1]])
+    return max(ways, key=lambda way: np.ptp(way) if len(way) else 0.0)
 
 
 def decide(
@@ -74,18 +97,20 @@ def decide(
     work, loss = loss_fraction(time, stroke, force)
     clear = abs(loss) >= LEAST_LOSS
     done = f"work per cycle {work:+.4g} J"
+    known = f"the {done} is only {abs(loss):.1%} of that of a damper with this force and stroke"
+    doubt = known if np.isfinite(work) else "the stroke does not come back: its work may be that of a spring or of gas"
     if sign is None and force_sign is None and not clear:
         ways = [Setting("sign", word) for word in SIGNS]
         raise ArgumentError(
-            f"{where}: the sign convention cannot be established from the data, because the {done} is only "
-            f"{abs(loss):.1%} of that of a damper with this force and stroke. Pass {ways[0]} or {ways[1]}.",
+            f"{where}: the sign convention cannot be established from the data, because {doubt}. Pass {ways[0]} or "
+            f"{ways[1]}.",
             *ways,
         )
     if clear:
         _refuse_contradiction(loss, sign, force_sign, f"{where}: ", done)
     turned = force_sign == "opposite" or (force_sign is None and sign is None and loss < 0)
     motion = -1.0 if sign == "compression-positive" else 1.0
-    return Decision(motion, -motion if turned else motion, _explain(sign, turned, done, clear))
+    return Decision(motion, -motion if turned else motion, _explain(sign, turned, done, "" if clear else doubt))
 
 
 def _refuse_contradiction(loss: float, sign: str | None, force_sign: str | None, where: str, done: str) -> None:
@@ -109,14 +134,14 @@ def _refuse_contradiction(loss: float, sign: str | None, force_sign: str | None,
         )
 
 
-def _explain(sign: str | None, turned: bool, work: str, clear: bool) -> tuple[str, ...]:
+def _explain(sign: str | None, turned: bool, work: str, doubt: str) -> tuple[str, ...]:
     notes = []
     if turned:
-        notes.append(f"{OPPOSITE} ({work}): force turned")
-    elif clear:
-        notes.append(f"force and stroke of the file agree in sign ({work})")
+        notes.append(f"{OPPOSITE} ({doubt or work}): force turned")
+    elif doubt:
+        notes.append(f"force and stroke of the file taken to agree in sign: {doubt}")
     else:
-        notes.append(f"force and stroke of the file taken to agree in sign: the {work} is too small to tell")
+        notes.append(f"force and stroke of the file agree in sign ({work})")
     if sign is None:
         notes.append(
             "positive stroke taken as rebound: if the bench counts compression positive, pass "

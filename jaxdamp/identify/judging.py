@@ -19,6 +19,7 @@ from jaxdamp.dampers import (
     coverage,
     drives_motion,
     laws_inside,
+    takes_command,
     with_standard_errors,
 )
 from jaxdamp.identify.blending import off_span
@@ -82,7 +83,8 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     percent, rmse, scores = score(models or model, problem.runs, fitted, problem.initial_state)
     notes = on_status(best, estimates.unsettled, _REMEDY)
     on_records = (*notes_on(model, problem.fitted_to), *off_span(model, problem.fitted_to, problem.initial_state))
-    effects = left_out(problem, best)
+    commands = not_followed(law, problem.fitted_to)
+    effects: list[str] = [] if commands else left_out(problem, best)  # which would be taken for what the commands do
     on_rest = on_misfit(noise, estimates.estimates, bool(effects))
     gas = gas_in_words(model, problem.fitted_to, estimates.estimates, estimates.covariance)
     main = (*notes, *on_records, *effects, *gas, *estimates.summary, *on_rest)
@@ -170,9 +172,23 @@ def fitted_models(problem: Problem, values: np.ndarray) -> tuple[list[Model], Mo
 
 
 def notes_on(model: Model, runs: Sequence[BenchRun]) -> list[str]:
-    """Sentences on numbers left as they were, records that contradict, strokes without place, a curve adding energy."""
+    """Sentences on commands and numbers left out, records that contradict, strokes without place, energy added."""
     law, apart = law_of(model), contradictions_in_words(contradicting(model, runs))
-    return _undeclared(law) + apart + _without_place(law, runs) + _driving(law, runs)
+    return not_followed(law, runs) + _undeclared(law) + apart + _without_place(law, runs) + _driving(law, runs)
+
+
+def not_followed(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
+    """A sentence on commands that vary during a record and have no effect on the law."""
+    varying = [run for run in runs if run.command_channel is not None]
+    if not varying or takes_command(law):
+        return []
+    ends = np.concatenate([run.command_channel for run in varying if run.command_channel is not None])
+    values = f"{ends.min():g} to {ends.max():g} {varying[0].command_unit}".rstrip()
+    return [
+        f"The command of {', '.join(run.name for run in varying[:3])} varies ({values}), which this law does not "
+        "follow: its numbers lie between those at one command and another. Cut the part in which it is held, "
+        "`process(between=(start, stop))`, or fit a law with settings (`dampers.Scheduled`)."
+    ]
 
 
 def _undeclared(law: AbstractDamper) -> list[str]:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from jaxdamp import bench
+from jaxdamp import bench, identify
 from jaxdamp.bench import BenchRun, CommandStep, RandomTest, SineTest, VirtualDyno
 from jaxdamp.dampers import Linear, Scheduled
 
@@ -117,6 +117,17 @@ def test_it_is_cut_and_filtered_with_the_record(run):
     assert len(run.last_cycles(1).command_channel) == len(run.last_cycles(1))
     with pytest.raises(ValueError, match=r"`mean_cycle` must be asked for where all cycles are alike"):
         run.process(mean_cycle=True)
+
+
+def test_a_command_that_varies_is_a_setting_of_its_own_and_one_that_is_held_in_a_part_is_held_there(run):
+    evaluation = bench.evaluate([run, run.held_at(0.3)])
+    assert list(evaluation.settings) == ["0 to 1", "0.3"]
+    assert f"The command of {run.name} varies, so that its figures are of no one setting." in evaluation.notes[0]
+    part = run.process(between=(1.56, 1.78))
+    assert part.command == 0.5 and part.command_channel is None
+    result = identify.fit(Linear, run)
+    assert "(0 to 1 A), which this law does not follow" in result.main_warnings[0]
+    assert not [warning for warning in result.warnings if "warms up" in warning or "friction of" in warning]
 
 
 def test_the_preflight_finds_nothing_odd_in_steps_and_names_a_command_that_is_held():

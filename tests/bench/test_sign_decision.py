@@ -52,7 +52,24 @@ def test_a_spring_cannot_decide():
     with pytest.raises(ValueError, match=r"cannot be established.*sign=\"rebound-positive\" or"):
         decide(TIME, STROKE, 1e4 * STROKE, None, None, "run")
     decision = decide(TIME, STROKE, 1e4 * STROKE, "rebound-positive", None, "run")
-    assert "too small to tell" in decision.notes[0]
+    assert "taken to agree in sign: the work per cycle" in decision.notes[0]
+
+
+@pytest.mark.parametrize("share", [0.5, 0.25, 0.75])
+def test_a_stroke_that_does_not_come_back_cannot_decide_but_one_that_does_can(share):
+    """From one end of the stroke against 800 N of gas: to the other end, to the middle, and half of the way back."""
+    time = np.arange(round(500 * share)) / 1000
+    stroke, velocity = -0.02 * np.cos(4 * np.pi * time), 0.02 * 4 * np.pi * np.sin(4 * np.pi * time)
+    force = 2000.0 * velocity - 800.0
+    if share > 0.5:
+        assert decide(time, stroke, force, None, None, "run").force == 1.0
+        assert decide(time, stroke, -force, None, None, "run").force == -1.0
+        return
+    with pytest.raises(ValueError, match=r"the stroke does not come back.*sign=\"rebound-positive\" or"):
+        decide(time, stroke, force, None, None, "run")
+    given = decide(time, stroke, force, "rebound-positive", None, "run")
+    assert given.force == 1.0 and "taken to agree in sign: the stroke does not come back" in given.notes[0]
+    assert decide(time, stroke, force, None, "opposite", "run").force == -1.0
 
 
 def test_unknown_words():

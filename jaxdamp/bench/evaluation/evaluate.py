@@ -19,6 +19,7 @@ from jaxdamp.bench.settings import by_number, settings_apart
 
 
 WINDOW = 0.05  # share of a stated velocity within which samples, or records, count as taken at it
+HELD = "Cut the part in which it is held, `process(between=(start, stop))`."
 
 
 @one_thread()
@@ -59,7 +60,7 @@ def evaluate(
     chosen = as_records(runs, "evaluate(runs)")
     cyclic = [run for run in chosen if run.cycles]
     if not cyclic:
-        _checks.refuse("runs", "hold a record with a full cycle", ", ".join(run.name for run in chosen))
+        _checks.refuse("runs", "hold a record with a full cycle", f"only {', '.join(repr(r.name) for r in chosen)}")
     settings, notes = _by_settings(cyclic, by)
     notes += _notes(chosen)
     cycles = {run.name: fold_cycles(run) for run in cyclic}
@@ -113,7 +114,10 @@ def _of_setting(
 
 def _notes(runs: Sequence[BenchRun]) -> list[str]:
     """What is not evaluated, and what belongs to no place in the damper."""
-    return [f"{run.name} has no full cycle: it is not evaluated." for run in runs if not run.cycles] + [
+    varying = [run.name for run in runs if run.command_channel is not None]
+    said = [f"The command of {name} varies, so that its figures are of no one setting. {HELD}" for name in varying]
+    said += [f"{run.name} has no full cycle: it is not evaluated." for run in runs if not run.cycles]
+    return said + [
         f"{run.name}: the stroke was integrated from the velocity, so that forces at mid-stroke and gas force belong "
         "to the middle of the motion, wherever in the damper that is."
         for run in runs
@@ -126,7 +130,7 @@ def _by_settings(
 ) -> tuple[dict[str, tuple[BenchRun, ...]], list[str]]:
     """The records of each setting, and a sentence where they are told apart by what they state or by their names."""
     notes: list[str] = []
-    if by is None and all(run.command is None for run in runs):
+    if by is None and all(run.commands is None for run in runs):
         apart, sentence = settings_apart(runs)
         notes += [sentence] if sentence else []
         if apart:
@@ -143,6 +147,8 @@ def _by_settings(
 def _setting(run: BenchRun, by: Callable[[BenchRun], object] | None) -> str:
     if by is not None:
         return str(by(run))
+    if run.command_channel is not None:
+        return f"{run.command_channel.min():g} to {run.command_channel.max():g}"
     return "" if run.command is None else f"{run.command:g}"
 
 
