@@ -53,6 +53,7 @@ CALLS = {
     r"state what was set on the damper \(`command`\)": "state what was set on the damper (--command)",
     r"`process\(low_pass=([^)]*)\)`": r"--filter \1",
     r"`process\(between=[^`]*`": "--between start:end",
+    r": `record_laws` has the law of each": "; the table of parameters has that of each",
     r", or fit a law with settings \(`dampers\.Scheduled`\)": "",
     r"`process\(moving=True\)` cuts it off": "it is cut off without --keep-rest",
     r"`process\(skip_cycles=[^)]*\)`": "--cycles skip:1",

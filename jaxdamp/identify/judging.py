@@ -48,12 +48,14 @@ from jaxdamp.identify.problem import AbstractResiduals, Problem, linearised
 from jaxdamp.identify.propagation import Evidence
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution
+from jaxdamp.identify.stated import start_paths
 from jaxdamp.identify.traces import Batch
-from jaxdamp.parameters import get, modules_inside, with_values
+from jaxdamp.parameters import get, modules_inside, parameters, with_values
 
 
 MOST_WARNINGS = 5  # that are shown at a terminal
 _REMEDY = "Try another start, bounds, or fewer free parameters."
+ALIKE = 0.1  # of their mean, by which values of records may differ to count as one
 DRAWS = 6  # perturbations, each with both signs
 
 
@@ -86,6 +88,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     commands = not_followed(law, problem.fitted_to)
     effects: list[str] = [] if commands else left_out(problem, best)  # which would be taken for what the commands do
     on_rest = on_misfit(noise, estimates.estimates, bool(effects))
+    on_records += _averaged(problem, best)
     gas = gas_in_words(model, problem.fitted_to, estimates.estimates, estimates.covariance)
     main = (*notes, *on_records, *effects, *gas, *estimates.summary, *on_rest)
     notes += [*on_records, *gas, *estimates.notes, *on_rest, *effects]
@@ -169,6 +172,21 @@ def fitted_models(problem: Problem, values: np.ndarray) -> tuple[list[Model], Mo
         of_record(with_values(built, {path: v[i] for path, v in own.items()}), i) for i in range(len(problem.runs))
     ]
     return models, with_means(built, problem.per_record)
+
+
+def _averaged(problem: Problem, best: SearchEnd) -> tuple[str, ...]:
+    """A sentence on each number of the law of which records have values that differ by more than `ALIKE`."""
+    tree, said = problem.free.started_at(best.values).tree, []
+    units = {p.path: p.unit for p in parameters(tree)}
+    for path in set(problem.per_record).difference(start_paths(tree)):
+        values = np.asarray(get(tree, path))
+        if not path.startswith("rig.") and np.ptp(values) > ALIKE * abs(np.mean(values)):
+            spread = f"{values.min():.4g} to {values.max():.4g} {units[path]}".rstrip()
+            said.append(
+                f"{path} of the law is the mean over the records, {np.mean(values):.4g}, whose values are {spread}: "
+                "`record_laws` has the law of each."
+            )
+    return tuple(said)
 
 
 def notes_on(model: Model, runs: Sequence[BenchRun]) -> list[str]:

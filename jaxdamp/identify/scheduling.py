@@ -22,6 +22,7 @@ from jaxdamp.identify.blending import AtSetting, Choice, choose_blend, with_blen
 from jaxdamp.identify.contradicting import refuse_contradicting
 from jaxdamp.identify.estimating import undetermined
 from jaxdamp.identify.fitting import fit, solve
+from jaxdamp.identify.judging import fitted_models
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import OFFSET, Machine, held_constant_forces, refuse_lag_of_held, without_command_lag
 from jaxdamp.identify.model import law_of, rig_of
@@ -196,7 +197,7 @@ def fit_scheduled(
     """
     blend, progress, bad_records = settings["blend"], settings["progress"], settings["bad_records"]
     runs = usable(settings_stated(as_runs(runs, call=CALL)), bad_records, robust=settings["loss"] != "squares")
-    if bad_records != "keep":
+    if bad_records != "keep" and not settings["per_record"]:
         refuse_contradicting(contradictions(runs, same_command=True))
     _checks.one_of("weighting", cast(str, settings["weighting"]), ("samples", "runs"))
     if blend is not None:
@@ -280,9 +281,12 @@ class Chain:
         if takes_command(problem.law):
             remedy = "Such a law is fitted to all commands by `fit`."
             _checks.refuse("law", "take no command itself", repr(problem.law), remedy)
+        if of_law := [path for path in problem.per_record if not path.startswith("rig.")]:
+            remedy = "Numbers of the law have a value for each setting: fit the records of one setting by themselves."
+            _checks.refuse("per_record", "name numbers of the machine for a law at settings", ", ".join(of_law), remedy)
         solution = solve(problem, starts=starts, max_steps=self.how["max_steps"], solver=self.how["solver"])
-        model = problem.free.started_at(solution.best.values).tree
-        errors = score(model, problem.runs)[:2]
+        models, model = fitted_models(problem, solution.best.values)
+        errors = score(models or model, problem.runs)[:2]
         open_numbers = undetermined(problem, solution.best)
         return AtSetting(law_of(model), rig_of(model), problem.runs, *errors, solution.closed_form, open_numbers)
 

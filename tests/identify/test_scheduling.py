@@ -47,6 +47,16 @@ def test_a_setting_between_others_is_predicted_without_its_records(runs):
         identify.fit_scheduled(Bilinear, runs[:1])
 
 
+def test_each_record_has_a_zero_error_of_its_own(runs):
+    more = [dataclasses.replace(run, name=f"{run.name} again", force=run.force + 80.0) for run in runs]
+    found = identify.fit_scheduled(Bilinear, [*runs, *more], rig="offset", per_record=["force_offset"], starts=1)
+    offsets = [e.value for e in found.result.parameters if "force_offset" in e.name]
+    assert len(offsets) == 6 and sorted(offsets) == pytest.approx([0.0] * 3 + [80.0] * 3, abs=2.0)
+    assert found.result.rmse < 5.5
+    with pytest.raises(ValueError, match="name numbers of the machine for a law at settings, but is law.rebound_rate"):
+        identify.fit_scheduled(Bilinear, runs, per_record=["rebound_rate"])
+
+
 FACTORS = {0.0: 4.0, 1.0: 1.0, 2.0: 0.25}
 
 

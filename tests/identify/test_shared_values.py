@@ -93,6 +93,7 @@ def test_a_value_of_each_record_beside_common_ones(warming_up):
     assert result[f"{path}[1]"].meaning.endswith(f"in record {warming_up[1].name!r}")
     assert [float(get(law, path)) for law in result.record_laws] == [result[f"{path}[{i}]"].value for i in range(3)]
     assert float(get(result.law, path)) == pytest.approx(np.mean([result[f"{path}[{i}]"].value for i in range(3)]))
+    assert [w for w in result.main_warnings if f"{path} of the law is the mean over the records" in w]
     common = fit(start, warming_up, freeze=["friction_velocity"])
     assert common.rmse > 5.0 * result.rmse and common.record_laws == ()
 
