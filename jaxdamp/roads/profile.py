@@ -1,7 +1,8 @@
 """Measured roads: arrays, text files, and OpenCRG."""
 
 import csv
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from jaxtyping import ArrayLike, Float
 from jaxdamp import _checks
 from jaxdamp._documents import read_text
 from jaxdamp._types import ScalarLike, VectorLike
+from jaxdamp._unit_registry import unit_registry
 from jaxdamp.roads._sampled import SampledRoad
 
 
@@ -132,29 +134,32 @@ def read_profile(
     position: Column = 0,
     height: Column | Sequence[Column] = 1,
     position_unit: str | None = None,
-    height_unit: str = "m",
+    height_unit: str | None = None,
     periodic: bool = False,
     ramp: float | int = 0.0,
 ) -> SampledRoad:
     r"""A road from a text file with one column of positions (or times) and one or several of heights.
 
     Columns are separated by commas, semicolons, tabs or blanks. Lines that begin with # or %, and empty ones, are left
-    out. Names of columns may stand in the first remaining line. Everything else is as for `from_profile`.
+    out. Names of columns may stand in the first remaining line, with their units: `position [ft],height [in]`, or
+    `height_mm`. Everything else is as for `from_profile`.
 
     Arguments:
         path: the file.
         speed: the speed of the vehicle [m/s] if the positions are distances along the road; left out if they are times.
         position: the column of positions, by name or by number from 0.
         height: the column of heights, or one column for each track, by name or by number from 0.
-        position_unit: "m" (which is assumed with a speed), "km", "cm", "mm", "ft" or "in"; without a speed "s" (which
-            is then assumed) or "ms".
-        height_unit: "m", "km", "cm", "mm", "ft" or "in".
+        position_unit: "m", "km", "cm", "mm", "ft" or "in"; without a speed "s" or "ms". By default the unit in the name
+            of the column; where it has none, "m", or "s" without a speed.
+        height_unit: "m", "km", "cm", "mm", "ft" or "in". By default the unit in the name of each column; where it has
+            none, "m".
         periodic: repeat the profile for ever, as for `from_profile`.
         ramp: the time [s] over which the road fades in, as for `from_profile`.
 
     Raises:
         ValueError: if the file holds no numbers, if lines differ in length or a field is not a number, if a column or
-            unit is unknown, or if `from_profile` refuses the values.
+            unit is unknown, if the unit of a column is none of its quantity or another one than is given, or if
+            `from_profile` refuses the values.
         FileNotFoundError: if there is no such file.
 
     >>> import tempfile, pathlib
@@ -165,22 +170,72 @@ def read_profile(
     Array([[0.005, 0.002],
            [0.   , 0.003]], dtype=float64)
     """
-    units = _TIMES if speed is None else _LENGTHS
-    unit = position_unit or next(iter(units))
-    _checks.one_of("position_unit", unit, units)
-    _checks.one_of("height_unit", height_unit, _LENGTHS)
+    of_positions = _TIMES if speed is None else _LENGTHS
+    for argument, unit, units in (
+        ("position_unit", position_unit, of_positions),
+        ("height_unit", height_unit, _LENGTHS),
+    ):
+        if unit is not None:
+            _checks.one_of(argument, unit, units)
     names, table = _table(Path(path))
-    columns = [height] if isinstance(height, str | int) else list(height)
-    heights = np.stack([table[:, _column("height", column, names, path)] for column in columns], axis=1)
-    positions = table[:, _column("position", position, names, path)] * units[unit]
-    return from_profile(positions, heights * _LENGTHS[height_unit], speed, periodic=periodic, ramp=ramp)
+    chosen = [height] if isinstance(height, str | int) else list(height)
+    columns = [_column("height", column, names, path) for column in chosen]
+    heights = [table[:, i] * _size_of_unit("height_unit", height_unit, names[i], _LENGTHS, path) for i in columns]
+    i = _column("position", position, names, path)
+    size = _size_of_unit("position_unit", position_unit, names[i], of_positions, path)
+    return from_profile(table[:, i] * size, np.stack(heights, axis=1), speed, periodic=periodic, ramp=ramp)
+
+
+def _size_of_unit(argument: str, given: str | None, name: str, units: Mapping[str, float], path: object) -> float:
+    """The unit of a column in SI: that in its name or, where this has none, the one given, or the first of `units`."""
+    written = _unit_in(name, units)
+    if not written:
+        return units[given or next(iter(units))]
+    size = _size(written, units)
+    if size is None:
+        kind = "time" if units is _TIMES else "length"
+        remedy = f"Usual units are {', '.join(units)}."
+        if argument == "position_unit":
+            remedy += " Positions along the road need `speed`, positions in time are without it."
+        must = f"name a file with a unit of {kind} in the header of its {argument.removesuffix('_unit')}s"
+        _checks.refuse("path", must, f"{path} with the column {name!r}", remedy)
+    if given is not None and not np.isclose(units[given], size, rtol=1e-9):
+        remedy = "Leave it out, or correct the header."
+        _checks.refuse(argument, f"be the unit of the column {name!r} of {path}", repr(given), remedy)
+    return size
+
+
+def _unit_in(name: str, units: Mapping[str, float]) -> str:
+    """The unit in the name of a column, in brackets or, if it is one of `units`, behind an underscore."""
+    brackets = re.findall(r"[\[({]\s*([^\[\](){}]*?)\s*[\])}]", name)
+    if brackets:
+        return brackets[-1]
+    tail = name.rpartition("_")
+    return tail[2] if tail[0] and tail[2] in units else ""
+
+
+def _size(written: str, units: Mapping[str, float]) -> float | None:
+    """A unit in SI, or None if it is none of the same quantity as `units`."""
+    known = next((unit for unit in (written, written.lower()) if unit in units), None)
+    if known is not None:
+        return units[known]
+    registry = unit_registry()  # not within `try`: that it does not start says nothing of the text
+    try:
+        return float(registry.Quantity(1.0, written).to(next(iter(units))).magnitude)
+    except Exception:  # pint answers unknown text with errors of many classes
+        return None
 
 
 def _table(path: Path) -> tuple[list[str], np.ndarray]:
     """The names of the columns (their numbers where there are none) and the numbers of a file."""
     lines = _lines(path)
     separator = next((mark for mark in ";\t," if mark in lines[0]), None)
-    split = [line.split() for line in lines] if separator is None else list(csv.reader(lines, delimiter=separator))
+    # a unit in brackets belongs to the name before it
+    split = (
+        [re.split(r"\s+(?![\[({])", line) for line in lines]
+        if separator is None
+        else list(csv.reader(lines, delimiter=separator))
+    )
     rows = [[field.strip() for field in row] for row in split]
     has_names = not all(map(_is_number, rows[0]))
     names = rows.pop(0) if has_names else [str(number) for number in range(len(rows[0]))]

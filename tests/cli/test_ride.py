@@ -144,7 +144,7 @@ def test_roads_from_files_go_under_every_axle(tmp_path: Path) -> None:
     car = vehicles.presets.half_car_002()
     x = np.linspace(0.0, 20.0, 201)
     file = tmp_path / "profile.csv"
-    file.write_text("x [m],z [m]\n" + "\n".join(f"{a},{0.01 * np.sin(a)}" for a in x))
+    file.write_text("x [ft],z [mm]\n" + "\n".join(f"{a / 0.3048},{10.0 * np.sin(a)}" for a in x))
     road = parse_road(str(file), speed=5.0, duration=3.0, seed=0)
     time = np.arange(301) / 100
     front, rear = np.asarray(simulate(car, road, duration=3.0, dt=0.01).road).T

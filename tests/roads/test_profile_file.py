@@ -34,12 +34,39 @@ def test_units_and_columns_by_name(tmp_path):
     assert road.grid == pytest.approx(0.02)
 
 
+@pytest.mark.parametrize(
+    ("head", "units"),
+    [
+        ("position [ft], height [in]", {}),
+        ("position (feet),height (inch)", {"height_unit": "in"}),  # of the library's units and of others
+        ("position[ft] height [in]", {}),
+        ("station_ft;z_in", {"position_unit": "ft"}),
+    ],
+)
+def test_the_header_names_the_units(tmp_path, head, units):
+    separator = next((mark for mark in ";," if mark in head), " ")
+    rows = [f"{x / 0.3048:.15g}{separator}{z / 0.0254:.15g}" for x, z in zip(PLACE, HEIGHT, strict=True)]
+    (tmp_path / "road.csv").write_text("\n".join([head, *rows]))
+    road = read_profile(tmp_path / "road.csv", 5.0, **units)
+    np.testing.assert_allclose(road.samples[:, 0], HEIGHT, atol=1e-14)
+    assert road.grid == pytest.approx(0.02)
+
+
 def test_without_a_speed_positions_are_times(tmp_path):
     (tmp_path / "road.csv").write_text(text())
     assert read_profile(tmp_path / "road.csv").grid == pytest.approx(0.1)
     assert read_profile(tmp_path / "road.csv", position_unit="ms").grid == pytest.approx(1e-4)
     with pytest.raises(ValueError, match=r"`position_unit` must be one of 's', 'ms', but is 'm'"):
         read_profile(tmp_path / "road.csv", position_unit="m")
+    (tmp_path / "road.csv").write_text(text(head="x [ms],z [m]\n"))
+    assert read_profile(tmp_path / "road.csv").grid == pytest.approx(1e-4)
+    with pytest.raises(
+        ValueError, match=r"a unit of length in the header of its positions.*'x \[ms\]'.*in time are without it"
+    ):
+        read_profile(tmp_path / "road.csv", 5.0)
+    (tmp_path / "road.csv").write_text(text(head="x [m],z [m]\n"))
+    with pytest.raises(ValueError, match=r"a unit of time in the header.*'x \[m\]'.*along the road need `speed`"):
+        read_profile(tmp_path / "road.csv")
 
 
 @pytest.mark.parametrize(
@@ -53,6 +80,9 @@ def test_without_a_speed_positions_are_times(tmp_path):
         ("x,z\n0,1\n1,2\n", {"height": 2}, r"`height` must be a column from 0 to 1, but is 2.*csv has \['x', 'z'\]"),
         ("hello\n", {}, r"`path` must name a file with numbers, but is .*road.csv, which has only 'hello'"),
         ("0,1\n1,2\n", {"height_unit": "inch"}, r"`height_unit` must be one of 'm', 'km'"),
+        ("x,z [mm]\n0,1\n1,2\n", {"height_unit": "m"}, r"`height_unit` must be the unit of the column 'z \[mm\]' of"),
+        ("x,z [N]\n0,1\n1,2\n", {}, r"a unit of length in the header of its heights, but is .*road.csv .*'z \[N\]'"),
+        ("x,z (left)\n0,1\n1,2\n", {}, r"column 'z \(left\)'. Usual units are m, km"),
         ("0,1\n1,nan\n", {}, r"`height` must be finite.*first at sample 1"),
     ],
 )
