@@ -285,13 +285,12 @@ def _require_sign(side: Side, how: How, what: str) -> None:
 
 def _refuse_half(where: str, missing: str = "") -> None:
     ways = Setting("side", "symmetric"), Setting("side", "rebound"), Setting("side", "compression")
-    what = (
-        f"has no points in {missing}"
-        if missing
-        else "has velocities and forces of one sign, and no header says of which"
-    )
+    if missing:
+        remedy = f"Add them, in this file or another one, or pass {ways[0]} if both directions are the same."
+        raise ArgumentError(f"{where} has no points in {missing}. {remedy}", ways[0])
     raise ArgumentError(
-        f"{where} {what}. Write rebound or compression into the header, give a file for each direction, or pass "
-        f"{ways[0]} if both are the same{'' if missing else f', {ways[1]} or {ways[2]}'}.",
+        f"{where} has velocities and forces of one sign, and no header says of which. Write rebound or compression "
+        f"into the header, or pass {ways[0]} if both directions are the same, and {ways[1]} or {ways[2]} if another "
+        "file has the other one, with its direction in its header.",
         *ways,
     )

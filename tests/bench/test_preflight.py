@@ -224,3 +224,11 @@ def test_table_plain_data_text_and_picture():
     assert "force clipped" in [label.get_text() for label in figure.axes[0].get_xticklabels()]
     with pytest.raises(ValueError, match="at least one record"):
         preflight([])
+
+
+def test_the_start_of_a_sine_has_no_ripple_of_the_mains():
+    time = np.arange(60) / 500
+    stroke = np.round(0.02 * np.sin(4 * np.pi * time), 8)
+    velocity = 0.02 * 4 * np.pi * np.cos(4 * np.pi * time)
+    run = BenchRun.from_arrays("short", time, stroke, 600 * np.tanh(velocity / 0.1) + 800 * velocity - 300.0)
+    assert not [found for found in preflight(run).findings if "ripple" in found.name]

@@ -77,6 +77,9 @@ def _resolution(values: Samples, still: int, stretches: int) -> float:
 
 MAINS = (50.0, 60.0)  # Hz
 _HARMONICS = 5  # of the mains
+_PERIODS = (
+    20  # of a line, at least: the noise is that of lines up to so many beside it, which zero frequency must not be
+)
 _RIPPLE = 3.0  # times the harmonics of the motion beside it
 
 
@@ -89,7 +92,7 @@ def mains_lines(values: Samples, rate: float, motion: float) -> dict[float, list
         motion: frequency of the motion [Hz], whose harmonics are no ripple.
     """
     orders = [(mains, k * mains) for mains in MAINS for k in range(1, _HARMONICS + 1) if rate > 2.2 * k * mains]
-    orders = [(mains, line) for mains, line in orders if 8 * motion <= line and len(values) >= 4 * rate / line]
+    orders = [(mains, line) for mains, line in orders if 8 * motion <= line and len(values) >= _PERIODS * rate / line]
     if not orders:
         return {}
     spectrum, lines = _Spectrum(values, rate), {}
