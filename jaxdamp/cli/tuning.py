@@ -32,6 +32,7 @@ from jaxdamp.report import MOST_POINTS, Table, best_points, sweep_report, tuning
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import stationary_notes
 from jaxdamp.sweeps import without_effect
+from jaxdamp.sweeps.axes import grid
 from jaxdamp.tune import Run, Status, TuneResult, limit_spans
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -252,7 +253,7 @@ def sweep_command(
     limit_spans(limits, names, dict.fromkeys(names, 1.0))  # refuses what is no limit before anything is driven
     beside = None if baseline is None else read_baseline(baseline, car)
     ride = Ride(car, surface, metrics=names, **run)
-    axes = axes_in_si(over, car)
+    axes = grid(axes_in_si(over, car)).values
     ride({name: values[0] for name, values in axes.items() if not ride.out_of_domain({name: values[:1]})[0]})
     screen.points(said)
     screen.points(unusual(road, driving.speed), style="yellow")
@@ -261,14 +262,14 @@ def sweep_command(
         return
     with job(screen, "sweep", output, resume=resume) as work:
         data, warned = swept(screen, ride, axes, how, store if store.exists() else kept_file("sweep.nc"))
-        data = data.load()
+        data = data.load()[names]  # in the order asked for: of points within the limits the first is named
         remarks = beyond_vehicles(car, axes) + warned
         at = _present(car, axes)
         at_start = {name: float(value) for name, value in ride(at if len(at) == len(axes) else None).items()}
         spans = limit_spans(limits, names, at_start)
         before = None if beside is None else dict(ride.of_vehicle(beside)())
         table = data.jaxdamp.table()
-        _show_points(screen, table, lambda: best_points(data, spans, before))
+        _show_points(screen, table, lambda: best_points(data, spans, before), limited=bool(spans))
         remarks += stationary_notes(ride.vehicle, surface) if isinstance(surface, WhiteRoad) else []
         remarks += [f"No effect on {name}: {', '.join(flat)}." for name, flat in without_effect(data).items()]
         screen.points(remarks, style="yellow")
@@ -280,11 +281,13 @@ def sweep_command(
         work.page(sweep_report, data, remarks=remarks, **marks)
 
 
-def _show_points(screen: Screen, table: Table, best: Callable[[], list[str]]) -> None:
-    """The first points of a sweep; of a large one also where its results are smallest."""
+def _show_points(screen: Screen, table: Table, best: Callable[[], list[str]], *, limited: bool) -> None:
+    """The first points of a sweep, how many are within the limits, and of a large one where results are smallest."""
     screen.table(table.first(MOST_POINTS if screen.verbose else ON_SCREEN))
     if len(table.rows) > ON_SCREEN:
         screen.points([f"sweep.csv has all {len(table.rows)} points.", *best()])
+    elif limited:
+        screen.points(best()[:1])
 
 
 def _comfort_and_grip(car: AbstractVehicle, names: Sequence[str], *, white: bool) -> tuple[str, str] | None:

@@ -32,6 +32,8 @@ def sweep(
 ) -> Figure:
     """A result of a sweep over a grid: a curve for one axis, a map for two; failed points are marked.
 
+    Axes of one value are named in the title; of a single point a marker is drawn.
+
     Where a limit is violated, a map is hatched, and points of curves are ringed. The best point is a star, and the
     present design a filled circle. `against` another result, the points are drawn in the plane of both, such as that of
     comfort and grip, with a line for each value of the first axis and red crosses at points beyond the limits.
@@ -54,6 +56,10 @@ def sweep(
     >>> len(sweep(data, "area").axes)  # the map and its bar of colours
     2
     """
+    fixed = ""
+    if over is None and (alone := _of_one_value(data, metric)):
+        fixed = f", {', '.join(f'{_words(data, n)} {_style.short(data[n].item())}{_unit(data, n)}' for n in alone)}"
+        data = data.squeeze(alone)
     axes = _grid_axes(data, metric)
     chosen, others = _chosen_axes(data, metric, axes, over)
     names = [str(name) for name in data.data_vars]
@@ -68,7 +74,7 @@ def sweep(
     idle = without_effect(data).get(metric, [])
     flat = f" (no effect of {' and '.join(_words(data, name) for name in idle)})" if idle else ""
     what = _words(data, metric) if against is None else "Designs"
-    _style.dress(plot, "", "", _style.first_upper(f"{what} over {over_axes}{flat}"))
+    _style.dress(plot, "", "", _style.first_upper(f"{what} over {over_axes}{fixed}{flat}"))
     if against is not None:
         if (other := _grid_axes(data, against, "against")) != axes:
             _checks.refuse("against", f"be a result over {axes}", f"{against!r} over {other}")
@@ -93,6 +99,12 @@ def _chosen_axes(
         remedy = "Choose one or two by `over`, and fix the others by `data.sel`."
         _checks.refuse("over", f"leave one or two axes, the others fixed (of {axes})", chosen, remedy)
     return chosen, others
+
+
+def _of_one_value(data: Dataset, metric: str) -> list[str]:
+    """The axes of a grid that need not be drawn; of a single point all but the first."""
+    axes = _grid_axes(data, metric)
+    return [name for name in axes if data.sizes[name] == 1 and (data[metric].size > 1 or name != axes[0])]
 
 
 def _grid_axes(data: Dataset, metric: str, argument: str = "metric") -> list[str]:
@@ -206,8 +218,9 @@ def _mark_present(
 
 
 def _widened(values: np.ndarray) -> tuple[float, float]:
-    """The ends of an axis with 5 % more on each side."""
-    return float(values.min() - 0.05 * np.ptp(values)), float(values.max() + 0.05 * np.ptp(values))
+    """The ends of an axis with 5 % more on each side; of one value, 5 % of it."""
+    more = 0.05 * float(np.ptp(values) or np.abs(values).max() or 1.0)
+    return float(values.min()) - more, float(values.max()) + more
 
 
 def _plane(

@@ -2,13 +2,16 @@
 
 import functools
 from collections.abc import Mapping, Sequence
-from typing import Unpack
+from typing import Any, Unpack
+
+import numpy as np
 
 from jaxdamp import plots
+from jaxdamp._display import display
 from jaxdamp._settings import with_defaults
 from jaxdamp._tables import percent_change, typeset_unit
 from jaxdamp._types import DataArray, Dataset, ScalarLike
-from jaxdamp._words import path_words
+from jaxdamp._words import first_upper, path_words
 from jaxdamp.report.page import PAGE, Page, Report
 from jaxdamp.sweeps import without_effect
 from jaxdamp.tune import Limits, limit_spans
@@ -49,7 +52,7 @@ def sweep_report(
     report = Report(**page)
     report.verdict(*best_points(data, limits, baseline))
     report.points(remarks)
-    if len(data["failed"].dims) <= MOST_AXES:
+    if data["failed"].squeeze().ndim <= MOST_AXES:
         for name in data.data_vars:
             metric = str(name)
             draw = functools.partial(plots.sweep, data, metric, limits=limits, present=present)
@@ -58,7 +61,7 @@ def sweep_report(
             draw = functools.partial(plots.sweep, data, plane[0], against=plane[1], limits=limits, present=present)
             report.picture(draw, " and ".join(map(path_words, plane)), "plane.png")
     else:
-        report.text(f"Grids of more than {MOST_AXES} axes are not drawn.")
+        report.text(f"Grids of more than {MOST_AXES} axes of several values are not drawn.")
     report.table(data.jaxdamp.table().first(MOST_POINTS))
     return report
 
@@ -68,6 +71,9 @@ def best_points(
 ) -> list[str]:
     """The smallest value of each result in a sentence, where it is, within the limits, and beside a baseline.
 
+    With limits, the first sentence says how many points are within them, with the smallest value of the first result;
+    or, if none is, by which limit the nearest point fails.
+
     Arguments:
         data: of `jaxdamp.sweep`.
         limits: as in `sweep_report`.
@@ -76,21 +82,41 @@ def best_points(
     dims = data["failed"].dims
     names = [str(name) for name in data.data_vars if data[name].dims == dims]
     axes = [str(name) for name in data.coords if name not in ("failed", "reason") and set(data[name].dims) & set(dims)]
+    spans = limit_spans(limits, names)
     allowed = ~data["failed"]
-    for name, (lower, upper) in limit_spans(limits, names).items():
+    for name, (lower, upper) in spans.items():
         allowed = allowed & (data[name] >= lower) & (data[name] <= upper)
     count, total = int(allowed.sum()), int(allowed.size)
-    sentences = [f"{count} of {total} points are within all limits."] if limits else []
     idle = without_effect(data)
-    sentences += [
+    sentences = [
         f"{path_words(over)} has no effect on {path_words(name)}: no value of it is better than another."
         for name, flat in idle.items()
         for over in flat
     ]
+    smallest = []
     for name in names if count else ():
         acting = [axis for axis in axes if axis not in idle.get(name, ())]
-        sentences += [_smallest(data, name, acting, allowed, baseline)] if acting else []
-    return sentences
+        smallest += [_smallest(data, name, acting, allowed, baseline)] if acting else []
+    if spans:
+        best = f"; {smallest.pop(0)}" if smallest else "." if count else f"{_nearest(data, axes, spans)}."
+        sentences.insert(0, f"{count} of {total} points are within all limits{best}")
+    return [*sentences, *map(first_upper, smallest)]
+
+
+def _nearest(data: Dataset, axes: Sequence[str], spans: Mapping[str, tuple[float, float]]) -> str:
+    """Of points that all fail, the one that is least beyond its limits, as a share of them, and the one it fails by."""
+    ends = [(name, end, sign) for name, pair in spans.items() for end, sign in zip(pair, (-1.0, 1.0), strict=True)]
+    ends = [(name, end, sign) for name, end, sign in ends if np.isfinite(end)]
+    beyond = [sign * (data[name] - end).where(~data["failed"]) / (abs(end) or 1.0) for name, end, sign in ends]
+    worst = np.max([share.values.ravel() for share in beyond], axis=0) if ends else np.array([np.nan])
+    if np.isnan(worst).all():
+        return ""  # no point has results
+    place = np.unravel_index(np.nanargmin(worst), data["failed"].shape)
+    name, end, sign = ends[int(np.argmax([share.values[place] for share in beyond]))]
+    where = _where(data, axes, data["failed"][place].coords)
+    value, limit = _in_words(data, name, data[name][place]), _in_words(data, name, end)
+    side = "above" if sign > 0 else "below"
+    return f": the nearest one, {where}, has {path_words(name)} of {value}, {side} its limit of {limit}"
 
 
 def _smallest(
@@ -103,15 +129,21 @@ def _smallest(
     """The smallest value of a result, where it is, and its change from the baseline."""
     values = data[name].where(allowed)
     place = values.isel(values.argmin(...)).coords
-    where = ", ".join(f"{path_words(axis)} = {_in_words(data, axis, place[axis])}" for axis in axes)
+    where = _where(data, axes, place)
     change = None if baseline is None else percent_change(float(baseline[name]), float(values.min()))
     if baseline is not None and change is not None:
         where += f", {change:+.1f} % from the baseline ({_in_words(data, name, baseline[name])})"
     ends = {axis: {float(data[axis].min()), float(data[axis].max())} for axis in axes if data.sizes.get(axis, 0) > 2}
     at_end = [path_words(axis) for axis, both in ends.items() if float(place[axis]) in both]
     widen = f" That is an end of {' and of '.join(at_end)}: widen the grid." if at_end else ""
-    return f"Smallest {path_words(name)}: {_in_words(data, name, values.min())} at {where}.{widen}"
+    return f"smallest {path_words(name)}: {_in_words(data, name, values.min())} at {where}.{widen}"
+
+
+def _where(data: Dataset, axes: Sequence[str], place: Mapping[Any, DataArray]) -> str:
+    return ", ".join(f"{path_words(axis)} = {_in_words(data, axis, place[axis])}" for axis in axes)
 
 
 def _in_words(data: Dataset, name: str, value: ScalarLike | DataArray) -> str:
-    return f"{float(value):.4g} {typeset_unit(data[name].attrs.get('units', ''))}".rstrip()
+    """A value of an axis or a result, rounded in the unit in which it is shown."""
+    shown = display().of(data[name].attrs.get("units", ""))
+    return f"{shown(float(value)):.4g} {typeset_unit(shown.unit)}".rstrip()

@@ -228,7 +228,22 @@ def as_points(over: object) -> AbstractPoints:
     if not isinstance(over, Mapping):
         remedy = "Write {'damper.rate': [1000.0, 2000.0]}, or use `jaxdamp.sweeps.points`, `random` or `sobol`."
         _checks.refuse("over", "be a mapping from names to values, or points", repr(over), remedy)
-    return Grid(_columns("over", over))
+    return grid(over)
+
+
+def grid(over: Mapping[str, object]) -> Grid:
+    """Every combination of the values of the axes.
+
+    Raises:
+        ValueError: an axis with a value twice.
+    """
+    columns = _columns("over", over)
+    for name, column in columns.items():
+        values, counts = np.unique(column, return_counts=True)
+        if counts.max() > 1:
+            found = f"{values[counts.argmax()]:g}, {counts.max()} times"
+            _checks.refuse(f"over[{name!r}]", "have each value once", found, "Leave the others out.")
+    return Grid(columns)
 
 
 def _columns(argument: str, values: Mapping[str, object]) -> Columns:

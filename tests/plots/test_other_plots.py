@@ -323,6 +323,23 @@ def test_a_sweep_over_one_axis_has_a_curve_for_each_value_of_another() -> None:
         plots.sweep(jaxdamp.sweep(lambda p: {"y": p["a"]}, sweeps.points({"a": [1.0, 2.0]})), "y")
 
 
+@pytest.mark.filterwarnings("error")
+def test_axes_of_one_value_are_named_and_not_drawn() -> None:
+    def product(p: dict) -> dict:
+        return {"y": p["a"] * p["b"], "z": p["a"] + p["b"]}
+
+    data = jaxdamp.sweep(product, {"a": [3.0], "b": [1.0, 2.0]})
+    (axes,) = plots.sweep(data, "y", limits={"y": 5.0}, present={"a": 3.0, "b": 1.5, "y": 4.5}).axes
+    assert (axes.get_xlabel(), axes.get_title(loc="left")) == ("b", "Y over b, a 3")
+    np.testing.assert_array_equal(axes.get_lines()[0].get_xydata(), [[1.0, 3.0], [2.0, 6.0]])
+    assert len(plots.sweep(data, "y", against="z").axes) == 2
+    point = data.isel(b=[0])
+    for present in ({}, {"a": 3.0, "b": 1.0}):
+        (axes,) = plots.sweep(point, "y", present=present).axes
+        np.testing.assert_array_equal(axes.get_lines()[0].get_xydata(), [[3.0, 3.0]])
+    plots.sweep(point, "y", against="z").canvas.draw()
+
+
 def test_a_reference_is_a_broad_line_beneath_the_others(responses: dict[str, Response]) -> None:
     axes = plots.ride(responses, reference="firm", window=(0.0, 12.0)).axes[0]
     firm = [line for line in axes.get_lines() if line.get_linewidth() == 3.5]
