@@ -10,6 +10,7 @@ from jaxdamp import _checks
 from jaxdamp._limits import between_numbers, within
 from jaxdamp._root import increasing_root
 from jaxdamp._types import Scalar, ScalarLike, State
+from jaxdamp._vectors import joined
 from jaxdamp.dampers._steps import GAMMA, sdirk2
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.contract import Traits
@@ -85,13 +86,36 @@ class AbstractSeries(AbstractWrapper):
         del deflections
         return (total_rate,)
 
+    def shared_at_rest(self, total: Scalar) -> Deflections:
+        """The deflection of each spring at rest, from their total [m]; by default one spring."""
+        return (total,)
+
+    def force_at_rest(self, total: Scalar) -> Scalar:
+        """Force [N] of the springs at rest at their total deflection [m], strictly increasing."""
+        return self.spring_force(self.shared_at_rest(total))
+
     def own_state_count(self) -> int:
         """One deflection [m]."""
         return 1
 
+    def state_at_rest(self, x: ScalarLike) -> State:
+        """The deflections at which the springs have the force of the law at rest, and the states of the law there."""
+        law = self.inner_law()
+
+        def law_force(y: Scalar) -> Scalar:
+            return law.force(y, jnp.zeros_like(y), law.state_at_rest(y))
+
+        locked = jnp.abs(law_force(jnp.asarray(x)))
+        zero = jnp.zeros_like(locked)
+        reach = self.largest_deflection(locked, self.shared_at_rest(zero))
+        total = increasing_root(
+            lambda total: self.force_at_rest(total) - law_force(x - total), zero, -reach, reach, steps=MOST_STEPS
+        )
+        return joined([jnp.stack(self.shared_at_rest(total)), law.state_at_rest(x - total)])
+
     def traits(self) -> Traits:
         """The force is that of the springs, which depends on states alone."""
-        return super().traits()._replace(has_feed_through=False, stroke_dependent_at_rest=False)
+        return super().traits()._replace(has_feed_through=False)
 
     @property
     def stroke_limits(self) -> tuple[ScalarLike, ScalarLike]:

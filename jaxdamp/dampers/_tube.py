@@ -11,7 +11,8 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_field_types
-from jaxdamp._limits import at_least, within
+from jaxdamp._limits import at_least, at_most, within
+from jaxdamp._root import increasing_root
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._steps import GAMMA, sdirk2
 from jaxdamp.dampers.base import AbstractDamper
@@ -64,8 +65,11 @@ class AbstractTube(AbstractDamper):
 
     def _above(self, x: ScalarLike, deflection: ScalarLike) -> Scalar:
         """p_r [Pa, absolute] of the oil above the piston."""
-        rise = oil_stiffness(x, self.bulk_modulus, self.piston.area, self.rebound_volume) * deflection
-        return at_least(self.gas.pressure + rise, self.cavitation_pressure)
+        return at_least(self.gas.pressure + self._stiffness_above(x) * deflection, self.cavitation_pressure)
+
+    def _stiffness_above(self, x: ScalarLike) -> Scalar:
+        """Increase of the pressure above the piston with the deflection there [Pa/m]."""
+        return oil_stiffness(x, self.bulk_modulus, self.piston.area, self.rebound_volume)
 
     def _gas_pressure(self, x: ScalarLike) -> Scalar:
         """Pressure of the gas [Pa, absolute] at the stroke x at which the rod alone would give its volume."""
@@ -75,6 +79,28 @@ class AbstractTube(AbstractDamper):
     @abstractmethod
     def incompressible(self) -> AbstractDamper:
         """The limit B → ∞ without cavities, a sum of laws without states."""
+
+    @abstractmethod
+    def _stiffnesses(self, x: ScalarLike) -> tuple[Scalar, ...]:
+        """Increase of the pressure in each chamber with its deflection [Pa/m]."""
+
+    @abstractmethod
+    def _gas_stroke(self, x: ScalarLike, *deflections: ScalarLike) -> Scalar:
+        """Stroke [m] at which the rod alone would give the present gas volume."""
+
+    def state_at_rest(self, x: ScalarLike) -> State:
+        """All oil at the pressure of the gas at this stroke, so that none flows."""
+        stiffnesses = self._stiffnesses(x)
+
+        def deflections(rise: Scalar) -> list[Scalar]:
+            return [rise / stiffness for stiffness in stiffnesses]
+
+        def surplus(rise: Scalar) -> Scalar:
+            return self.gas.pressure + rise - self._gas_pressure(self._gas_stroke(x, *deflections(rise)))
+
+        most = self._gas_pressure(x) - self.gas.pressure  # by the rod alone; the oil yields to it
+        rise = increasing_root(surplus, most, at_most(most, 0.0), at_least(most, 0.0), steps=20)
+        return jnp.stack(deflections(rise))
 
     @abstractmethod
     def _roots_at(self, x: ScalarLike, deflections: State) -> tuple[Scalar, ...]:

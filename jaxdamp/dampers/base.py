@@ -74,6 +74,15 @@ class AbstractDamper(Module):
     def initial_state(self) -> State:
         """The states of a damper at rest without dynamic force."""
 
+    def state_at_rest(self, x: ScalarLike) -> State:
+        """The states of a damper that is held at stroke x [m] for long, in which vehicles start and are linearised.
+
+        By default `initial_state()`, as of friction, which holds what it has. A law whose states follow its static
+        force, or that of a law inside, overrides it: `state_rate(x, 0, state_at_rest(x))` is zero.
+        """
+        del x
+        return self.initial_state()
+
     @abstractmethod
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
         """Force [N] at stroke x [m], velocity v [m/s] and these states."""

@@ -71,6 +71,11 @@ class Bushing(AbstractSeries):
         oil = carried / (duration * (self.oil_stiffness + self.stiffness) + self.damping)
         return oil, total - oil
 
+    def shared_at_rest(self, total: Scalar) -> Deflections:
+        """k_o x_o = k_b x_b."""
+        oil = self.stiffness * total / (self.oil_stiffness + self.stiffness)
+        return oil, total - oil
+
     def shared_rate(self, total_rate: Scalar, deflections: Deflections) -> Deflections:
         """ẋ_b = (F − k_b x_b)/c_b of the bushing, and the remaining rate of the oil column [m/s]."""
         rubber = (self.spring_force(deflections) - self.stiffness * deflections[1]) / self.damping

@@ -30,8 +30,8 @@ class Traits(NamedTuple):
         linear_in_parameters: the force is linear in the parameters declared `linear=True`, all others fixed, so that a
             fit of these has a closed form.
         stroke_dependent: the force depends on the stroke, directly or since the last reversal.
-        stroke_dependent_at_rest: the force at zero velocity and initial states depends on the stroke, so that the law
-            affects the static equilibrium of a vehicle.
+        stroke_dependent_at_rest: the force at rest, in the states of `state_at_rest`, depends on the stroke, so that
+            the law affects the static equilibrium of a vehicle.
         has_explicit_step: some states have an explicit step, which must be shorter than their time constants.
         contains_offset: a parameter adds a constant to the force, as a zero error of a load cell does, so that a fit
             cannot tell the two apart (`constant_forces` names it, if it has no other meaning).

@@ -55,7 +55,7 @@ class FrequencySelective(AbstractDamper):
         """The force is a state, linear in that of the laws inside."""
         linear = self.high.traits().linear_in_parameters and self.low.traits().linear_in_parameters
         inside = super().traits()
-        return inside._replace(has_feed_through=False, linear_in_parameters=linear, stroke_dependent_at_rest=False)
+        return inside._replace(has_feed_through=False, linear_in_parameters=linear)
 
     def __check_init__(self) -> None:
         check_field_types(self)
@@ -71,6 +71,11 @@ class FrequencySelective(AbstractDamper):
     def initial_state(self) -> State:
         """Zero velocity and no force."""
         return jnp.zeros(2)
+
+    def state_at_rest(self, x: ScalarLike) -> State:
+        """Zero velocity and the force of both laws at rest [N]."""
+        still = jnp.zeros_like(x)
+        return jnp.stack([still, self.settled_force(x, still, still)])
 
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
         """Force [N]."""

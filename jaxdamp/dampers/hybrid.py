@@ -49,6 +49,10 @@ class Hybrid(AbstractDamper):
         """The states of the network."""
         return self.hysteresis.initial_state()
 
+    def state_at_rest(self, x: ScalarLike) -> State:
+        """The states of the network at rest."""
+        return self.hysteresis.state_at_rest(x)
+
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
         """Force [N]."""
         return self.backbone.force_velocity(v) + self.hysteresis.force(x, v, state)

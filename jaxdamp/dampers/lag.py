@@ -5,6 +5,7 @@ from typing import final
 import jax.numpy as jnp
 
 from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp._vectors import joined
 from jaxdamp.dampers._steps import follow
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.contract import Traits
@@ -38,7 +39,12 @@ class Lag(AbstractWrapper):
 
     def traits(self) -> Traits:
         """The force is a state, which is smooth where the velocity has a kink."""
-        return super().traits()._replace(has_feed_through=False, stroke_dependent_at_rest=False)
+        return super().traits()._replace(has_feed_through=False)
+
+    def state_at_rest(self, x: ScalarLike) -> State:
+        """The force of the law at rest [N], and its states."""
+        inner = self.law.state_at_rest(x)
+        return joined([self.law.force(x, jnp.zeros_like(x), inner)[None], inner])
 
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
         """Force [N]."""

@@ -79,8 +79,11 @@ class MonoTube(AbstractTube):
         """p_r and p_c [Pa, absolute] at stroke x [m] and deflection e [m]."""
         return self._above(x, deflection), self._gas_pressure(self._gas_stroke(x, deflection))
 
-    def _gas_stroke(self, x: ScalarLike, deflection: ScalarLike) -> Scalar:
-        """Stroke [m] at which the rod alone would give the present gas volume."""
+    def _stiffnesses(self, x: ScalarLike) -> tuple[Scalar, ...]:
+        return (self._stiffness_above(x),)
+
+    def _gas_stroke(self, x: ScalarLike, *deflections: ScalarLike) -> Scalar:
+        (deflection,) = deflections
         return x + self.piston.area * deflection / self.gas.rod_area
 
     def _drop(self, x: ScalarLike, deflection: ScalarLike) -> Scalar:

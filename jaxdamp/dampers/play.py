@@ -15,6 +15,9 @@ from jaxdamp.dampers.contract import Traits
 from jaxdamp.parameters import nonnegative, parameter, positive
 
 
+TRACE = 1e-12  # of the stiffness, in the clearance at rest
+
+
 def dead_zone(deflection: ScalarLike, clearance: ScalarLike) -> Scalar:
     """max(x_s − δ, 0) − max(−x_s − δ, 0) [m], the part of a deflection beyond a clearance of ±δ."""
     return deflection - within(deflection, -clearance, clearance)
@@ -35,6 +38,11 @@ class AbstractClearance(AbstractSeries):
         """Force [N] of the spring behind its clearance."""
         stiffness, clearance = self.contact()
         return stiffness * dead_zone(deflections[0], clearance)
+
+    def force_at_rest(self, total: Scalar) -> Scalar:
+        """Force [N] of the spring, and a trace of it in the clearance, so that the middle is where nothing pulls."""
+        stiffness, _ = self.contact()
+        return self.spring_force((total,)) + TRACE * stiffness * total
 
     def spring_in_stage(
         self, law_force: Callable[[Scalar], Scalar], free: Scalar, duration: ScalarLike

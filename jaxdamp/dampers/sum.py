@@ -86,6 +86,10 @@ class Sum(AbstractDamper):
         """The states of all terms."""
         return joined([term.initial_state() for term in self.terms])
 
+    def state_at_rest(self, x: ScalarLike) -> State:
+        """The states of all terms at rest."""
+        return joined([term.state_at_rest(x) for term in self.terms])
+
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
         """Sum of the forces [N]."""
         return jnp.sum(jnp.stack([term.force(x, v, s) for term, s in self._with_states(state)]), axis=0)

@@ -84,15 +84,19 @@ class TwinTube(AbstractTube):
 
     def pressures(self, x: ScalarLike, above: ScalarLike, below: ScalarLike) -> tuple[Scalar, Scalar, Scalar]:
         """p_r, p_c and p_g [Pa, absolute] at stroke x [m] and deflections e and c [m]."""
-        stiffness = oil_stiffness(-x, self.bulk_modulus, self._full_area, self.compression_volume)
+        _, stiffness = self._stiffnesses(x)
         return (
             self._above(x, above),
             at_least(self.gas.pressure + stiffness * below, self.cavitation_pressure),
             self._gas_pressure(self._gas_stroke(x, above, below)),
         )
 
-    def _gas_stroke(self, x: ScalarLike, above: ScalarLike, below: ScalarLike) -> Scalar:
-        """Stroke [m] at which the rod alone would give the present gas volume."""
+    def _stiffnesses(self, x: ScalarLike) -> tuple[Scalar, ...]:
+        below = oil_stiffness(-x, self.bulk_modulus, self._full_area, self.compression_volume)
+        return self._stiffness_above(x), below
+
+    def _gas_stroke(self, x: ScalarLike, *deflections: ScalarLike) -> Scalar:
+        above, below = deflections
         return x + (self.piston.area * above + self._full_area * below) / self.gas.rod_area
 
     def _rates(self, v: ScalarLike, roots: Pair) -> Pair:

@@ -74,6 +74,13 @@ class AbstractWrapper(AbstractDamper):
         count = self.own_state_count()
         return joined([jnp.zeros(count), inner]) if count else inner
 
+    def state_at_rest(self, x: ScalarLike) -> State:
+        """Own states as in `initial_state`, then those of the law inside at rest."""
+        stroke, _ = self.inner_motion(x, jnp.zeros_like(x))
+        inner = self.inner_law().state_at_rest(stroke)
+        count = self.own_state_count()
+        return joined([self.initial_state()[:count], inner]) if count else inner
+
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
         """Force [N]."""
         return self.outer_force(self.inner_law().force(*self.inner_motion(x, v), state))

@@ -92,8 +92,8 @@ class Adaptive(AbstractEngine):
         def field(t: Scalar, y: tuple[Array, States]) -> tuple[Array, States]:
             return equations.rates(*y, road(t))
 
-        resumed = isinstance(start, RunState)
-        begin = (start.now.motion, start.now.states) if resumed else (start, equations.ports.initial())
+        first = start.now if isinstance(start, RunState) else equations.at_rest(start, road(time[0]))
+        begin = first.motion, first.states
         options = {"mode": self.mode, "every": observer.every}
         solver, limit = self._solver(), STEPS_PER_INSTANT
         run, status = solve(field, begin, time, solver, self.rtol, self.atol, steps_per_instant=limit, **options)

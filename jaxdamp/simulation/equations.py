@@ -102,8 +102,9 @@ class Equations(eqx.Module):
         return eqx.tree_at(lambda equations: equations.ports, self, Ports(laws, self.layout))
 
     def at_rest(self, motion: Float[Array, " n"], road: RoadInput) -> StepState:
-        """The beginning of a run, with elements at rest."""
-        return self.at(laid_out(motion, self.layout), self.ports.initial(), road)
+        """The beginning of a run, with elements at rest at the deflections of this motion."""
+        motion = laid_out(motion, self.layout)
+        return self.at(motion, self.ports.at_rest(self.at_ports(motion, road)[0]), road)
 
     def rates(self, motion: Float[Array, " n"], states: States, road: RoadInput) -> tuple[Float[Array, " n"], States]:
         """Time derivatives (q̇, q̈) of the motion and those of the states, for vectors that are arrays."""

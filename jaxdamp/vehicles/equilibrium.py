@@ -30,7 +30,7 @@ SHARES = 0.5 ** np.arange(8.0)  # of a Newton step
 def rest_position(system: System, road: Float[Array, " wheels"]) -> Float[Array, " q"]:
     """The coordinates of the static equilibrium: K q + Pᵀ f(P q − S z_r, 0) = K_r z_r.
 
-    The laws are in their initial states. If no law depends on its stroke at rest, this is one linear system; otherwise
+    The laws are in their states at rest. If no law depends on its stroke at rest, this is one linear system; otherwise
     it is solved by Newton's method with step control. Derivatives are exact (implicit function theorem). NaN if no
     equilibrium is found.
 
@@ -41,7 +41,7 @@ def rest_position(system: System, road: Float[Array, " wheels"]) -> Float[Array,
     form, ports = system.form, Ports(system.laws)
     if not any(law.traits().stroke_dependent_at_rest for law in system.laws):
         still = jnp.zeros(len(system.laws))
-        forces = ports.force(still, still, ports.initial())
+        forces = ports.force(still, still, ports.at_rest(still))
         return solve(form.stiffness, form.road_stiffness @ road - form.ports.T @ forces)
     scale = jnp.max(jnp.diag(form.stiffness))  # N/m, converts residual forces to lengths
     solver = _SharedNewton(atol=1e-8 if scale.dtype == jnp.float32 else 1e-14)
@@ -57,7 +57,7 @@ def _residual_force(form: PortForm, ports: Ports, road: Array, q: Float[Array, "
     """The unbalanced forces at a position [N], and their derivatives with respect to it [N/m]."""
     deflection = form.at_ports(q, road)
     slopes, _ = ports.stiffness_and_damping(deflection)
-    forces = ports.force(deflection, jnp.zeros_like(deflection), ports.initial())
+    forces = ports.force(deflection, jnp.zeros_like(deflection), ports.at_rest(deflection))
     residual = form.stiffness @ q + form.ports.T @ forces - form.road_stiffness @ road
     return residual, form.stiffness + (form.ports.T * slopes[None, :]) @ form.ports
 

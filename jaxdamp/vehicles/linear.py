@@ -55,7 +55,7 @@ def equivalent_slopes(
         states = ports.advance(x0, v0, x1, v1, states, 1.0 / (frequency * POINTS))
         return states, ports.force(x1, v1, states)
 
-    _, forces = jax.lax.scan(step, ports.initial(), (x[:-1], v[:-1], x[1:], v[1:]))
+    _, forces = jax.lax.scan(step, ports.at_rest(centre), (x[:-1], v[:-1], x[1:], v[1:]))
     last, of_cycle = forces[-POINTS:], slice(-POINTS, None)
     stiffness = 2.0 * jnp.mean(last * sine[of_cycle, None], axis=0) / x_max
     return stiffness, 2.0 * jnp.mean(last * cosine[of_cycle, None], axis=0) / (rate * x_max)
@@ -227,7 +227,7 @@ def _linearise(vehicle: AbstractVehicle, amplitude: Array | None, frequency: Arr
     if amplitude is not None and frequency is not None:
         slopes = jnp.concatenate([*map(jnp.diag, equivalent_slopes(ports, at_rest, amplitude, frequency))], axis=1)
         return _assembled(vehicle, LinearLaws(jnp.zeros(count), slopes, tuple(range(count))))
-    start, unravel = jax.flatten_util.ravel_pytree(ports.initial())
+    start, unravel = jax.flatten_util.ravel_pytree(ports.at_rest(at_rest))
 
     def answers(motions: Array) -> Array:
         """Forces, then rates of the states, as a function of deflections, rates and states."""

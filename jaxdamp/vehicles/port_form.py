@@ -79,8 +79,12 @@ class Ports(eqx.Module):
         )
 
     def initial(self) -> States:
-        """The states of elements at rest."""
+        """The states of elements that nothing has moved."""
         return self._each(lambda law: law.initial_state(), [])
+
+    def at_rest(self, x: AtPorts) -> States:
+        """The states of elements that are held at these deflections [m]."""
+        return self._each(lambda law, x: law.state_at_rest(x), [x])
 
     def force(self, x: AtPorts, v: AtPorts, states: States) -> AtPorts:
         """Forces [N] at deflections [m] and rates [m/s]."""
@@ -134,9 +138,9 @@ class Ports(eqx.Module):
         return [of_port[port] for port in sorted(of_port)]
 
     def stiffness_and_damping(self, x: Float[Array, " ports"]) -> tuple[Array, Array]:
-        """Slopes ∂F/∂x [N/m] and ∂F/∂v [N s/m] of the forces at rest at the deflections x."""
-        states, still, one = self.initial(), jnp.zeros_like(x), jnp.ones_like(x)
-        _, stiffness = jax.jvp(lambda x: self.force(x, still, states), (x,), (one,))
+        """Slopes dF/dx [N/m] of the forces at rest at the deflections x, and ∂F/∂v [N s/m] with the states there."""
+        states, still, one = self.at_rest(x), jnp.zeros_like(x), jnp.ones_like(x)
+        _, stiffness = jax.jvp(lambda x: self.force(x, still, self.at_rest(x)), (x,), (one,))
         _, damping = jax.jvp(lambda v: self.force(x, v, states), (still,), (one,))
         return stiffness, damping
 

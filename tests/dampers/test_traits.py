@@ -19,6 +19,7 @@ from jaxdamp.dampers import (
     MotionRatio,
     Play,
     Scheduled,
+    SeriesSpring,
     Spring,
     StrokeDependent,
     TemperatureScaled,
@@ -69,12 +70,13 @@ def test_the_velocity_must_be_answered_at_once_somewhere():
 
 def test_a_law_at_rest_depends_on_the_stroke_as_its_parts_do():
     slack = [
-        Lag(Spring(1e3), 0.01),
+        Lag(Linear(1e3), 0.01),
         KaradayiMasada(2600.0, 1200.0, 40.0, 0.01, 1e6, 3e-4),
         Scheduled((Linear(1.0), Linear(2.0)), [0, 1], 0.5),
         0.5 * (Linear(1.0) + network()),
     ]
     stiff = [2.0 * Spring(1e3), MotionRatio(Linear(1.0) + GasSpring(2e6, 6e-5, 1e-4), 0.8), ModifiedBoucWen.prototype()]
+    stiff += [Lag(Spring(1e3), 0.01), SeriesSpring(Linear(1.0) + Spring(1e3), 1e6)]
     assert not any(law.traits().stroke_dependent_at_rest for law in slack)
     assert all(law.traits().stroke_dependent_at_rest for law in stiff)
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from jaxdamp import dampers, roads, simulate
+from jaxdamp import Ride, dampers, roads, simulate
+from jaxdamp.metrics import Metric
 from jaxdamp.parameters import replace
-from jaxdamp.vehicles import CubicSpring, QuarterCar, linearise, static_equilibrium
+from jaxdamp.vehicles import CubicSpring, QuarterCar, linearise, oscillations, static_equilibrium
 from jaxdamp.vehicles.frame import LiftOff
 from jaxdamp.vehicles.port_form import Ports
 
@@ -107,6 +108,73 @@ def test_rest_is_differentiable_both_ways():
     difference = (float(height(8.01e6)) - float(height(7.99e6))) / 2e4
     assert float(jax.grad(height)(8e6)) == pytest.approx(difference, rel=1e-5)
     assert float(jax.jacfwd(height)(8e6)) == pytest.approx(difference, rel=1e-5)
+
+
+PULLS = dampers.Linear(120.0) + dampers.Spring(500.0, -50.0)
+TUBE = dampers.MonoTube.reference()
+LEVELS = [0.0, 1.0]
+WITH_STATES = {  # each is PULLS at rest, or a tube its gas spring
+    "lag": dampers.Lag(PULLS, 0.01),
+    "series": dampers.SeriesSpring(PULLS, 1e10, 1e12),
+    "play": dampers.Play(PULLS, 1e10, 0.0),
+    "bushing": dampers.Bushing(PULLS, 2e10, 1e10, 1e4),
+    "frequency": dampers.FrequencySelective(PULLS, dampers.Linear(100.0), 0.04, 0.001),
+    "scheduled": dampers.Scheduled((2.0 * dampers.Lag(PULLS, 0.02), dampers.Scaled(PULLS, 0.0)), LEVELS, 0.5, "force"),
+    "hot": dampers.Heated(dampers.MotionRatio(dampers.Lag(4.0 * PULLS, 0.01), 0.5), sensitivity=0.0)
+    + dampers.Spring(0.0, 50.0),
+    "mono": TUBE,
+    "twin": dampers.TwinTube.reference(),
+}
+
+
+@pytest.mark.parametrize("name", list(WITH_STATES))
+def test_at_rest_the_states_of_a_law_stand_still_with_its_static_force(name):
+    law, x = WITH_STATES[name], jnp.asarray(0.02)
+    tubes = ("mono", "twin")
+    plain = law.incompressible() if name in tubes else PULLS
+
+    @jax.jit
+    def at_rest(x):
+        def force(x):
+            return law.force(x, 0.0, law.state_at_rest(x))
+
+        rates = law.state_rate(x, 0.0, law.state_at_rest(x))
+        return force(x), jax.grad(force)(x), plain.force(x, 0.0, jnp.zeros(0)), rates
+
+    force, slope, expected, rates = at_rest(x)
+    assert float(force) == pytest.approx(float(expected), rel=1e-3 if name in tubes else 1e-6)
+    by_stroke = jax.grad(lambda x: plain.force(x, 0.0, jnp.zeros(0)))(x)
+    assert float(slope) == pytest.approx(float(by_stroke), rel=5e-3 if name in tubes else 1e-6)
+    np.testing.assert_allclose(rates, 0.0, atol=1e-5)
+
+
+def test_a_play_at_rest_is_loaded_or_hangs_free_in_its_clearance():
+    def deflection(spring):
+        law = dampers.Play(dampers.Linear(100.0) + spring, 1e5, 1e-3)
+        return jax.value_and_grad(lambda x: law.state_at_rest(x)[0])(jnp.asarray(5e-4))
+
+    for spring, expected in (
+        (dampers.Spring(0.0, -500.0), (-6e-3, 0.0)),
+        (dampers.Spring(1e3), (5e-4, 1.0)),
+        (dampers.Spring(0.0), (0.0, 0.0)),
+    ):
+        assert [*map(float, deflection(spring))] == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_car_rests_on_static_forces_in_laws_with_states_and_stays_there():
+    names = ("lag", "series", "bushing", "scheduled")
+    stop = dampers.BumpStop(0.002, 2e5, end="both")
+    laws = [dampers.Sum(tuple(WITH_STATES[name] for name in names)), 4.0 * PULLS]
+    with_states, plain = (QuarterCar(350.0, 35.0, 22e3, 200e3, law, bump_stop=stop) for law in laws)
+    lifted = float(static_equilibrium(plain)["z_sprung"])
+    assert lifted > 0.003 and float(static_equilibrium(with_states)["z_sprung"]) == pytest.approx(lifted, rel=1e-6)
+    found = np.sort(oscillations(with_states).frequency)
+    np.testing.assert_allclose(found, np.sort(oscillations(plain).frequency), rtol=0.02)
+    flat = roads.in_phase(roads.sine(0.0, frequency=1.0))
+    motion = np.asarray(simulate(with_states, flat, duration=0.3).motion)
+    np.testing.assert_allclose(motion, motion[:1].repeat(301, axis=0), atol=1e-9)
+    ride = Ride(with_states, flat, duration=0.3, metrics=[Metric("z_sprung", "maximum", name="height")])
+    assert float(ride({})["height"]) == pytest.approx(lifted, rel=1e-6)
 
 
 def test_no_equilibrium_is_said():
