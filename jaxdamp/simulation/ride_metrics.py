@@ -5,15 +5,16 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import ArrayLike, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from jaxdamp import _checks, metrics
 from jaxdamp._quickly import compiled_for_loops, compiled_quickly
 from jaxdamp._tables import Compared, Table, comparison_table, percent_change
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Scalar, ScalarLike, Signal
+from jaxdamp._vectors import scalars
 from jaxdamp.metrics import Metric, MetricValues, Statistic
-from jaxdamp.simulation.equations import settled
+from jaxdamp.simulation.equations import Equations, RoadInput, settled
 from jaxdamp.vehicles import System
 
 
@@ -141,16 +142,32 @@ _cut = jax.jit(jax.lax.dynamic_slice_in_dim, static_argnums=2)  # in one program
 
 
 def _at_rest(run: "Response") -> tuple[Scalar, ...]:
-    """The channels in the static equilibrium on the first heights of a run, forces left out."""
-    known = _checks.concrete(run.road)
-    first = run.road[0] if known is None else known[0]
-    return run.remembered("at rest", lambda: _channels_at_rest(run.system, first))
+    """The channels in the static equilibrium on the first heights of a run, as a `Ride` begins."""
+
+    def first(rows: Float[Array, "time _"]) -> Float[ArrayLike, " _"]:
+        known = _checks.concrete(rows)
+        return rows[0] if known is None else known[0]
+
+    commands = None if run.commands is None else first(run.commands)
+    begin = first(run.road), first(run.road_rate), commands
+    return run.remembered("at rest", lambda: _channels_at_rest(run.system, *begin))
 
 
 @compiled_quickly
-def _channels_at_rest(system: System, road: Float[ArrayLike, " wheels"]) -> tuple[Scalar, ...]:
-    height = jnp.asarray(road)
-    return tuple(system.outputs(settled(system, height), jnp.zeros(system.outputs.force.shape[1]), height, None))
+def _channels_at_rest(
+    system: System,
+    road: Float[ArrayLike, " wheels"],
+    road_rate: Float[ArrayLike, " wheels"],
+    commands: Float[ArrayLike, " commands"] | None,
+) -> tuple[Scalar, ...]:
+    ground, equations = RoadInput(jnp.asarray(road), jnp.asarray(road_rate)), Equations(system)
+    now = equations.at_rest(settled(system, ground.height), ground)
+    force = now.force
+    if commands is not None:
+        given = jnp.asarray(commands)
+        acting = equations.at_commands(scalars(given[: given.size // 2]))
+        force = jnp.concatenate([acting.at(now.motion, now.states, ground).force, given])
+    return tuple(system.outputs(now.motion, force, *ground))
 
 
 if TYPE_CHECKING:

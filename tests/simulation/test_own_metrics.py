@@ -45,6 +45,22 @@ def test_gathered_and_of_the_channels_are_one(run, driven):
         assert float(values[name]) == pytest.approx(float(value), rel=1e-9), name
 
 
+def test_from_rest_a_force_counts_from_the_static_one():
+    """A gas spring pushes at rest, and the tyre's damping feels the first slope of the road."""
+    gas = dampers.Linear(1500.0) + dampers.GasSpring(2e6, 6e-5, 1e-4)
+    car = vehicles.QuarterCar(300.0, 40.0, 20e3, 180e3, gas, tyre_damping=300.0)
+    wanted = [Metric(c, "peak", from_rest=True, name=c) for c in ("damper_force", "dynamic_tyre_load")]
+    road = roads.sine(0.01, frequency=2.0)
+    run, ride = simulate(car, road, duration=0.3), Ride(car, road, metrics=wanted, duration=0.3)
+    found, expected = run.metrics(wanted), ride()
+    for name, value in expected.items():
+        assert float(found[name]) == pytest.approx(float(value), rel=1e-9), name
+    part = run.between(0.1, 0.2)
+    moved = np.asarray(part["damper_force"]) - float(run["damper_force"][0])
+    value = part.metrics(wanted[:1])["damper_force"]
+    assert float(value) == pytest.approx(np.max(np.abs(moved)), rel=1e-9)
+
+
 def test_they_are_what_numpy_makes_of_the_channels(run, driven):
     values = {name: float(value) for name, value in driven().items()}
     a, force, v = (np.asarray(run[c]) for c in ("sprung_acceleration", "damper_force", "damper_velocity"))
