@@ -37,9 +37,10 @@ class Controlled(AbstractVehicle):
 
     Between two levels of a `Scheduled` law its force is taken as straight in the command, which it is where the law is
     linear in its parameters or its forces are blended; else the force misses the demand a little. Demand and command
-    are channels, `{damper}_demand` [N] and `{damper}_command`: what the damper could not do is their difference from
-    `{damper}_force`. Limits are rounded over a tenth of the range, and the quotient of force and velocity below the
-    velocity `still`: sharper ones gain nothing, and make runs chaotic, so that their derivatives are useless.
+    are channels, `{damper}_demand` [N] and `{damper}_command`: what the damper could not do is the difference of demand
+    and `{damper}_force`. A policy demands the force of all equal dampers side by side (`damper_count`) together; both
+    channels are those of one. Limits are rounded over a tenth of the range, and the quotient of force and velocity
+    below the velocity `still`: sharper ones gain nothing, and make runs chaotic, so that their derivatives are useless.
 
     A run begins with the commands that the laws have. The order at an instant: the sensors see the vehicle just before,
     with forces under the old command; then the policy decides; then forces are those of the new command. With fixed
@@ -134,18 +135,19 @@ class Controlled(AbstractVehicle):
         """That of the vehicle, with the channels of command and demand of each damper."""
         layout = self.car.layout
         dampers, _ = self.commanded(list(_forces_at_levels(self.car, self.still)))
-        return dataclasses.replace(layout, channels=(*layout.channels, *_channels(dampers)))
+        return dataclasses.replace(layout, channels=(*layout.channels, *_channels(dampers, layout)))
 
     def system(self) -> System:
         """The assembled vehicle with its controller."""
         return _controlled_system(self, self.layout)
 
 
-def _channels(dampers: Sequence[str]) -> list[Channel]:
+def _channels(dampers: Sequence[str], layout: Layout) -> list[Channel]:
     """The channels of control, commands before demands."""
     commands = [Channel(f"{d}_command", ChannelKind.COMMAND, d, f"command of {d}, in its unit") for d in dampers]
-    words = "force that the controller demands of {}, positive where it resists extension"
-    return commands + [Channel(f"{d}_demand", ChannelKind.FORCE, d, words.format(d)) for d in dampers]
+    of = {d: layout.by_name[f"{d}_force"].description.removeprefix("force of ") for d in dampers}
+    words = "force that the controller demands of {}"
+    return commands + [Channel(f"{d}_demand", ChannelKind.FORCE, d, words.format(of[d])) for d in dampers]
 
 
 @compiled_quickly
@@ -192,7 +194,8 @@ def _controlled_system(vehicle: Controlled, layout: Layout) -> System:
         *(jnp.pad(a, ((0, more), (0, 0))) for a in (outputs.motion, outputs.force, outputs.road, outputs.road_rate))
     )
     count = outputs.force.shape[0]
-    force = jnp.concatenate([wide.force, jnp.eye(count + more, more, -count)], axis=1)
+    one = jnp.array([1.0] * len(dampers) + [1.0 / frame.element(name).count for name in dampers])
+    force = jnp.concatenate([wide.force, jnp.eye(count + more, more, -count) * one[None, :]], axis=1)
     outputs = dataclasses.replace(wide, force=force)
     return dataclasses.replace(system, layout=layout, outputs=outputs, control=loop)
 

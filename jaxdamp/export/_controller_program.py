@@ -140,8 +140,10 @@ class ControllerProgram(PreparedProgram):
     def outputs(self) -> list[Line]:
         """What it gives, in the order of the array y."""
         commands = [Line(f"{d}_command", "", f"command of {d}, in the unit of its levels") for d in self.dampers]
+        counts = {d: self.vehicle.frame().element(d).count for d in self.dampers}
+        of = {d: f"{d}, of {n} equal ones together" if n > 1 else d for d, n in counts.items()}
         said = "force demanded of {}, positive where it resists extension"
-        return commands + [Line(f"{d}_demand", "N", said.format(d)) for d in self.dampers]
+        return commands + [Line(f"{d}_demand", "N", said.format(of[d])) for d in self.dampers]
 
     def _prepared(self, values: Numbers, dt: Array) -> PyTree:
         system = self.vehicle_of(values).system()

@@ -212,6 +212,20 @@ def test_what_was_delivered_of_the_demand_is_told():
     assert simulate(QUARTER, ROAD, duration=0.5).delivered() == {}
 
 
+def test_the_demand_of_equal_dampers_is_told_of_one():
+    corner = Corner(45.0, 22e3, 200e3, DAMPER, damper_count=2)
+    car = HalfCar(700.0, 1200.0, 1.2, 1.5, Corner(40.0, 18e3, 200e3, DAMPER), corner)
+    controlled = Controlled(car, StateFeedback(velocity=3000.0), still=1e-3, period=1e-3)
+    run = simulate(controlled, ROAD, duration=0.5)
+    delivered = run.delivered()
+    assert delivered["front_damper"].share == pytest.approx(1.0, abs=0.02)
+    assert delivered["rear_damper"].share == pytest.approx(1.0, abs=0.02)
+    velocity = np.asarray(run["rear_damper_velocity"])
+    np.testing.assert_allclose(run["rear_damper_demand"][1:], 0.5 * 3000.0 * velocity[:-1], rtol=1e-9, atol=1e-9)
+    assert "of one of 2 equal ones" in run.descriptions["rear_damper_demand"]
+    assert "equal" not in run.descriptions["front_damper_demand"]
+
+
 def test_policies_come_back_from_json(tmp_path):
     for policy in (lqr(HALF), Preview(BandSkyhook(1000.0), jnp.array([500.0]), 0.1), ModalSkyhook(), lqr(QUARTER)):
         to_json(policy, tmp_path / "policy.json")
