@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from jaxdamp import _checks
-from jaxdamp._tables import percent_change, typeset_unit
+from jaxdamp._tables import typeset_unit
 from jaxdamp._traced import equal
 from jaxdamp._types import Artist, Axes, Figure, VectorLike
 from jaxdamp.dampers import AbstractDamper
@@ -14,6 +14,7 @@ from jaxdamp.plots._rides import without_answer
 from jaxdamp.plots.rides import default_channels
 from jaxdamp.rig import quasi_static
 from jaxdamp.tune import ParetoFront, TuneResult, limit_spans
+from jaxdamp.tune.verdict import change_in_percent
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -86,7 +87,7 @@ def _bars(axes: Axes, result: TuneResult) -> None:
     """Relative change of each metric, with its values."""
     names = list(result.before)
     rows = np.arange(len(names), dtype=float)
-    change = [percent_change(result.before[n], result.after[n]) or 0.0 for n in names]
+    change = [change_in_percent(result, n, result.before[n], result.after[n]) or 0.0 for n in names]
     colours = [_style.COLOURS[1] if c > 0 else _style.COLOURS[2] for c in change]
     axes.barh(rows, change, 0.65, color=colours)
     reached = dict.fromkeys(result.limits, " (limited)") | dict.fromkeys(result.active_limits, " (limit reached)")

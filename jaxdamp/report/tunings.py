@@ -7,12 +7,13 @@ import numpy as np
 
 from jaxdamp import _checks, plots
 from jaxdamp._settings import with_defaults
-from jaxdamp._tables import Compared, Table, comparison_table, percent_change
+from jaxdamp._tables import Compared, Table, comparison_table
 from jaxdamp._traced import equal
 from jaxdamp.parameters import get
 from jaxdamp.report.page import PAGE, Page, Report
 from jaxdamp.simulation import Response, Ride
 from jaxdamp.tune import Rescore, TuneResult, damper_paths
+from jaxdamp.tune.verdict import change_in_percent
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -114,7 +115,7 @@ def _beside(result: TuneResult, baseline: AbstractVehicle) -> Table:
     rows = []
     for name in (name for name in result.units if name in rides[0]):
         values = [float(ride[name]) for ride in rides]
-        rows.append(Compared(name, result.units[name], values, percent_change(values[0], values[-1])))
+        rows.append(Compared(name, result.units[name], values, change_in_percent(result, name, values[0], values[-1])))
     where = "the first road" if result.scenarios is not None else "the road"
     title = f"Ride metrics on {where} of the tuning; the change is from the baseline to the tuned vehicle"
     return comparison_table(title, "metric", ("baseline", "before", "after"), rows)

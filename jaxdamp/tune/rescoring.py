@@ -102,9 +102,10 @@ class Rescore(AbstractResult):
         return len(self.before[self.metric])
 
     def change(self, name: str) -> Float[np.ndarray, " roads"]:
-        """Relative change of a metric on each road; NaN where it was zero."""
+        """Change of a metric on each road, relative to its size before, positive if it rises; NaN where it was zero."""
         before, after = self.before[name], self.after[name]
-        return np.divide(after, before, out=np.full(len(before), np.nan), where=before != 0.0) - 1.0
+        ratio = np.divide(after, before, out=np.full(len(before), np.nan), where=before != 0.0)
+        return np.sign(before) * (ratio - 1.0)
 
     def and_on(self, other: "Rescore") -> "Rescore":
         """The same vehicles on these roads and on those of another rescoring."""

@@ -22,7 +22,7 @@ from jaxdamp.tune.ranges import Change
 from jaxdamp.tune.rescoring import Rescore, Spectrum, spectra
 from jaxdamp.tune.scenarios import Road
 from jaxdamp.tune.settings import Run
-from jaxdamp.tune.verdict import Verdict, at_limit, mean_change, verdict_of
+from jaxdamp.tune.verdict import Verdict, at_limit, change_in_percent, mean_change, verdict_of
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -197,12 +197,16 @@ class TuneResult(AbstractResult, Generic[V]):
         return self
 
     def table(self) -> Table:
-        """The ride metrics before and after, with notes on the minimised metric and on limits."""
+        """The ride metrics before and after, with notes on the minimised metric and on limits.
+
+        A metric that may be negative, such as a mean, has no change in percent.
+        """
         rows = []
         for (name, before), after in zip(self.before.items(), self.after.values(), strict=True):
             on_fresh = () if self.fresh is None else (mean_change(self, name),)
             more = (*on_fresh, self._note(name))
-            rows.append(Compared(name, self.units[name], (before, after), percent_change(before, after), more))
+            change = change_in_percent(self, name, before, after)
+            rows.append(Compared(name, self.units[name], (before, after), change, more))
         fresh = () if self.fresh is None else (Column("on fresh roads", "%", "+.1f"),)
         return comparison_table("Ride metrics", "metric", ("before", "after"), rows, (*fresh, Column("note")))
 
@@ -238,7 +242,8 @@ class TuneResult(AbstractResult, Generic[V]):
             _checks.one_of("metrics", name, each.after)
             pairs = zip(each.names, each.before[name].tolist(), each.after[name].tolist(), strict=True)
             rows += [
-                Compared(name, self.units[name], pair, percent_change(*pair), (scenario,)) for scenario, *pair in pairs
+                Compared(name, self.units[name], pair, change_in_percent(self, name, *pair), (scenario,))
+                for scenario, *pair in pairs
             ]
         return comparison_table("In every scenario", "metric", ("before", "after"), rows, (Column("scenario"),))
 

@@ -88,16 +88,22 @@ def verdict_of(result: "TuneResult[AbstractVehicle]") -> Verdict:
 def _change(result: "TuneResult[AbstractVehicle]") -> tuple[float, str]:
     """The change of the objective [%] and its words, with its interval and the roads that it holds for."""
     fresh, name = result.fresh, result.metric
-    here = percent_change(result.before[name], result.after[name])
+    signed = name in signed_metrics(result)
     if fresh is None or not np.all(np.isfinite(fresh.change(name))):
-        before, after = (f"{side[name]:.4g}" for side in (result.before, result.after))
+        here = change_in_percent(result, name, result.before[name], result.after[name])
         change = 100.0 * (result.after[name] - result.before[name]) if here is None else here
-        share = f"{before} -> {after}" if here is None else f"{here:+.1f} %"
+        share = _from_to(result, name, result.before[name], result.after[name]) if here is None else f"{here:+.1f} %"
         return change, f"{name} {share} {result.elsewhere or 'on the road of the tuning'}"
     mean, half = 100.0 * float(np.mean(fresh.change(name))), 100.0 * fresh.half_width(name)
     error = f" ± {half:.1f}" if np.isfinite(half) else ""
     roads = f"{fresh.roads} fresh roads" if fresh.roads > 1 else "1 fresh road, which gives no interval"
-    return mean, f"{name} {mean:+.1f}{error} % on {roads}"
+    sides = float(fresh.before[name].mean()), float(fresh.after[name].mean())
+    share = _from_to(result, name, *sides) if signed else f"{mean:+.1f}{error} %"
+    return mean, f"{name} {share} on {roads}"
+
+
+def _from_to(result: "TuneResult[AbstractVehicle]", name: str, before: float, after: float) -> str:
+    return f"{before:.4g} -> {after:.4g} {typeset_unit(result.units[name])}".rstrip()
 
 
 def _price(result: "TuneResult[AbstractVehicle]") -> tuple[float, str]:
@@ -124,10 +130,21 @@ def _has_price(metric: Metric, vehicle: AbstractVehicle) -> bool:
     return not metric.statistic.signed and vehicle.layout.by_name[metric.channel].kind in PRICED
 
 
+def signed_metrics(result: "TuneResult[AbstractVehicle]") -> set[str]:
+    """Names of the metrics that may be negative, of which a change in percent says nothing."""
+    known = (*result.start.layout.metrics, *(result.objective.metrics if result.objective else ()))
+    return {metric.name for metric in known if metric.statistic.signed}
+
+
+def change_in_percent(result: "TuneResult[AbstractVehicle]", name: str, before: float, after: float) -> float | None:
+    """The change of a metric [%]; none from zero, and none of one that may be negative."""
+    return None if name in signed_metrics(result) else percent_change(before, after)
+
+
 def mean_change(result: "TuneResult[AbstractVehicle]", name: str) -> float | None:
-    """The change of a metric [%], the mean on fresh roads if there are any; none from zero."""
-    if result.fresh is None or name not in result.fresh.before:
-        return percent_change(result.before[name], result.after[name])
+    """The change of a metric [%], the mean on fresh roads if there are any; none as of `change_in_percent`."""
+    if result.fresh is None or name not in result.fresh.before or name in signed_metrics(result):
+        return change_in_percent(result, name, result.before[name], result.after[name])
     change = 100.0 * float(np.mean(result.fresh.change(name)))
     return change if np.isfinite(change) else None
 

@@ -19,6 +19,7 @@ from jaxdamp.vehicles import presets
 
 CAR = presets.quarter_car_000()
 COMFORT, TYRE, TRAVEL = "rms_sprung_acceleration", "rms_dynamic_tyre_load", "working_space_peak_to_peak"
+MEAN = "working_space_mean"
 WHITE = roads.white("C", 20.0)
 
 
@@ -62,6 +63,23 @@ def test_the_verdict_is_that_of_the_fresh_roads(metrics, outcome, words):
     assert result.summary.startswith(result.verdict.sentence) and result.verdict.better == (outcome is Outcome.BETTER)
     data = result.to_dict()
     assert data["verdict"] == outcome.name
+
+
+def test_metrics_that_may_be_negative_have_no_percent():
+    """A limit of -5 % of a negative number lets it fall, whereas its quotient rises."""
+    fresh = Rescore({MEAN: np.full(3, -0.02)}, {MEAN: np.array([-0.0209, -0.021, -0.0211])}, {MEAN: "m"}, MEAN)
+    np.testing.assert_allclose(fresh.change(MEAN), [-0.045, -0.05, -0.055], rtol=1e-9)
+    sides = {MEAN: -0.02, COMFORT: 1.0}, {MEAN: -0.021, COMFORT: 0.9}
+    words: dict[str, Any] = dict(warnings=(), status=Status.CONVERGED, history=(1.0,), parameters=())
+    allowed = limit_ranges({MEAN: ("-5%", None)}, [MEAN])
+    words |= dict(limits={MEAN: (-0.021, np.inf)}, allowed=allowed, active_limits=(MEAN,))
+    words["units"] = {MEAN: "m", COMFORT: ""}
+    result = TuneResult(CAR, CAR, COMFORT, before=sides[0], after=sides[1], **words)
+    assert f"limits: {MEAN} -0.021 m, at its limit" in result.summary
+    assert [row["change"] for row in result.table().records()] == [None, pytest.approx(-10.0)]
+    words |= dict(limits={}, allowed={}, fresh=fresh)
+    lowered = TuneResult(CAR, CAR, MEAN, before=sides[0], after=sides[1], **words)
+    assert lowered.verdict.sentence.startswith(f"Better: {MEAN} -0.02 -> -0.021 m on 3 fresh roads")
 
 
 def test_outside_its_records_a_damper_is_not_called_better():
