@@ -9,6 +9,7 @@ import numpy as np
 
 from jaxdamp import _checks, export, plots, roads, simulate
 from jaxdamp._display import display
+from jaxdamp._tables import typeset_unit
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.controlling import Controlling
 from jaxdamp.cli.early import refuse_road
@@ -154,7 +155,8 @@ def ride(
 ) -> None:
     """Ride on a road: metrics, comfort by ISO 2631-1 and pictures, beside a baseline.
 
-    The vehicle has its own dampers, or the law of --start at every one.
+    The vehicle has its own dampers, or the law of --start at every one. The channels over time, channels_*.csv, are in
+    SI and positive in rebound whatever units and sign are shown.
 
     Arguments:
         command: what is set on the dampers, such as clicks or a coil current; that of their laws if left out.
@@ -218,11 +220,16 @@ def headline(screen: Screen, table: Table, vehicle: AbstractVehicle, more: Colle
 
 
 def _write(folder: Path, laws: Mapping[str, AbstractDamper], responses: Mapping[str, Response]) -> None:
-    """Laws and channels."""
+    """Laws and channels, which are in SI and positive in rebound whatever is shown."""
     for name, law in laws.items():
         export.to_json(law, folder / f"{'law' if name == 'vehicle' else name}.json")
     *_, car = (response.vehicle for response in responses.values())
     if car.passive is not car:
         export.to_json(car, folder / "vehicle.json")  # `jaxdamp export` makes C of its controller
     for name, response in responses.items():
-        response.to_xarray().to_dataframe().to_csv(folder / f"channels_{name}.csv")
+        channels = response.to_xarray()
+        units = {key: typeset_unit(each.attrs["units"]) for key, each in channels.variables.items()}
+        headings = {key: f"{key} [{unit}]" if unit else key for key, unit in units.items()}
+        channels.to_dataframe().reset_index().rename(columns=headings).to_csv(
+            folder / f"channels_{name}.csv", index=False
+        )

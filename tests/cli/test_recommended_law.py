@@ -87,6 +87,10 @@ def test_verdict_object_file_and_page_never_disagree(situation: str, tmp_path: P
         ("Argument `bounds['rate']` must increase.", "Option --bound of 'rate' must"),
         ("Argument `law.rate` must be above 0.", "law.rate must"),
         ("Pass `dt=0.0005`, or more.", "--dt 0.0005,"),
+        (
+            "Set them equal first, with `jaxdamp.parameters.replace(..., {'damper.rebound_rate': ...})`.",
+            "with damper.rebound_rate = NUMBER below [parameters] of VEHICLE.toml",
+        ),
     ],
 )
 def test_the_command_line_names_options_instead_of_calls(

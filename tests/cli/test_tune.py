@@ -235,6 +235,17 @@ FILES = {
 }
 
 
+def test_parameters_are_tied_after_a_vehicle_file_sets_them_equal(tmp_path: Path) -> None:
+    to_json(Bilinear(2600.0, 1200.0), tmp_path / "law.json")
+    words = ["white:C", "--start", tmp_path / "law.json", "--tie", "damper.compression_rate=damper.rebound_rate"]
+    remedy = "with damper.compression_rate = NUMBER below [parameters] of VEHICLE.toml."
+    assert remedy in refused(tmp_path, "tune", "quarter_car_000", *words)
+    file = _toml(tmp_path, 'preset = "quarter_car_000"\n[parameters]\ndamper.compression_rate = 2600.0\n')
+    jaxdamp("tune", file, *words, "--limit", "grip=none", "--out", tmp_path / "tuned")
+    law = from_json(tmp_path / "tuned" / "law.json")
+    assert float(law.compression_rate) == float(law.rebound_rate) > 2600.0
+
+
 @pytest.mark.parametrize(("words", "message"), WRONG, ids=[" ".join(words[1:]) for words, _ in WRONG])
 def test_wrong_words_are_refused(law: Path, tmp_path: Path, words: list[str], message: str) -> None:
     files = {"LAW": law} | {word: _toml(tmp_path, FILES[word]) for word in words if word in FILES}
