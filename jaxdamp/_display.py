@@ -50,6 +50,7 @@ _SIGNED = re.compile(
     r"(mid-stroke |stated )?(rebound |compression |mean |static |gas |least |largest )?(force|velocity|stroke)( at .*)?"
 )
 _ENDS = (("lowest", "highest"), ("fitted from", "fitted to"), ("least force", "largest force"), ("from", "to"))
+_ENDS += (("minimum", "maximum"),)
 _PHRASES = {  # of the library's sign, and of the other
     "+ rebound, − compression": "+ compression, − rebound",
     "+ rebound": "+ compression",

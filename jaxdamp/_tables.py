@@ -230,6 +230,7 @@ def _cell_shown(present: Display, column: Column, cell: Cell, unit: str, quantit
     if not isinstance(cell, float) or own in ("", "–", "%"):
         return cell
     signed = present.signed(column.name if column.unit else quantity) and column.name not in _SPREADS
+    signed &= not (quantity and column.name == "velocity")  # it is positive, the direction is in the quantity
     return _scaled(cell, present.of(own.replace("²", "^2"), signed=signed).factor)
 
 

@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from jaxdamp._display import Display, shown_in
 from jaxdamp.bench import BenchRun, Limit, SineTest, VirtualDyno, evaluate, read, read_limits, separate_gas_and_friction
+from jaxdamp.bench.evaluation.limits import UNITS
 from jaxdamp.dampers import Bilinear
 
 
@@ -239,18 +241,42 @@ def test_repeated_records_are_averaged_with_their_scatter(two_settings):
 def test_limits_from_a_table_pass_and_fail(two_settings, tmp_path):
     path = tmp_path / "limits.csv"
     path.write_text(
-        "quantity,velocity [m/s],setting,minimum,maximum\n"
-        "rebound force,0.131,3,200,300\n"
-        "gas force,,*,-200,-100\n"
-        "rebound force,5.0,,0,\n"
+        "quantity;velocity [mm/s];setting;minimum [daN];maximum [daN]\n"
+        "rebound force;131;3;20,0;30,0\n"
+        "gas force;;*;-20,0;-10,0\n"
+        "rebound force;5e3;;0;\n"
+        "compression force;188,0;3;-44,0;-39,0\n"  # at none of the usual velocities
     )
-    check = two_settings.check(read_limits(path))
+    limits = read_limits(path)
+    assert limits[0] == Limit("rebound force", 200.0, 300.0, 0.131, "3")
+    check = two_settings.check(limits)
     verdicts = [row["verdict"] for row in check.table().records()]
-    assert verdicts == ["passed", "FAILED", "passed", "NOT MEASURED"] and not check.passed
+    assert verdicts == ["passed", "FAILED", "passed", "NOT MEASURED", "NOT MEASURED", "passed"] and not check.passed
+    assert check.warnings[1].startswith(
+        "rebound force at 5 m/s of setting 1: NOT MEASURED: the records give forces from"
+    )
+    stated = evaluate(two_settings.runs, velocities=[0.188]).get("compression force", setting="3", velocity=0.188)
+    assert check.results[-1][1] == stated
     assert two_settings.check([Limit("friction", maximum=50.0)]).passed
     assert json.loads(json.dumps(check.to_dict(), allow_nan=False))["passed"] is False
     energy = two_settings.check([Limit("energy per cycle", minimum=0.0, record="hard*")])
     assert len(energy.results) == 3
+
+
+def test_limits_are_shown_in_the_units_and_the_sign_of_a_shop(evaluation):
+    check = evaluation.check([Limit("rebound force", 700, 760, velocity=9), Limit("friction", 0.0, 50.0, record="x")])
+    with shown_in(Display("imperial", "compression-positive")):
+        force, friction = check.table().shown().records()
+    pound = 4.4482216152605
+    assert (force["velocity"], force["unit"]) == (pytest.approx(9 / 0.0254), "lbf")
+    assert (force["minimum"], force["maximum"]) == pytest.approx((-760 / pound, -700 / pound))
+    assert friction["maximum"] == pytest.approx(50 / pound) and friction["verdict"] == "NOT MEASURED"
+
+
+def test_limits_know_the_unit_of_every_quantity(evaluation, two_settings):
+    straight = evaluate([sine(0.02, f, kneed) for f in (0.5, 2.0)])
+    measured = {m.quantity: m.unit for e in (evaluation, two_settings, straight) for m in e.measurements}
+    assert measured == UNITS
 
 
 @pytest.mark.parametrize(
@@ -259,6 +285,13 @@ def test_limits_from_a_table_pass_and_fail(two_settings, tmp_path):
         ("name,minimum\nx,1\n", "line 1: there is no column 'quantity'"),
         ("quantity,least\nx,1\n", "column 'least' is unknown"),
         ("quantity,minimum\nfriction,1\ngas force,five\n", "line 3: the minimum is 'five', which is no number"),
+        (
+            "quantity,minimum [mm]\nfriction,1\n",
+            "line 2: .*`minimum` must have a unit of 'friction' .*'N', but is 'mm'",
+        ),
+        ("quantity,minimum [N]\nrebound/compression ratio,2\n", "`minimum` must have no unit for 'rebound/compression"),
+        ("quantity,velocity,minimum\nrebound force,-0.1,1\n", "`velocity` must be positive"),
+        ("quantity;minimum\nfriction;1,200\n", "line 2: the comma in '1,200' may be a decimal sign"),
         ("quantity,minimum,maximum\nfriction,,\n", "line 2: .*`minimum` must be given"),
         ("quantity,minimum,maximum\nfriction,3,2\n", "line 2: .*`minimum` must be at most"),
     ],
@@ -281,7 +314,7 @@ def test_what_cannot_be_evaluated_is_refused_or_said(evaluation):
     time = np.arange(50) / 100
     half = BenchRun.from_arrays("half", time, 0.01 * np.sin(2 * time), np.cos(2 * time))
     assert "half has no full cycle" in evaluate([half, sine(0.01, 1.0, bilinear)]).notes[0]
-    with pytest.raises(ValueError, match="record with a full cycle, but is half"):
+    with pytest.raises(ValueError, match="record with a full cycle, but is only 'half'"):
         evaluate(half)
     with pytest.raises(ValueError, match="`velocities` must be positive"):
         evaluate(evaluation.runs, velocities=(-0.1,))

@@ -11,14 +11,14 @@ from jaxdamp._one_thread import one_thread
 from jaxdamp.bench.analysis import FoldedCycles, as_records, fold_cycles
 from jaxdamp.bench.contradictions import repeats
 from jaxdamp.bench.evaluation import curve
-from jaxdamp.bench.evaluation.curve import Measurement, measured, record_measurements
+from jaxdamp.bench.evaluation.curve import Measurement, record_measurements
 from jaxdamp.bench.evaluation.result import Evaluation
 from jaxdamp.bench.evaluation.separation import GasAndFriction, separate_gas_and_friction
+from jaxdamp.bench.evaluation.stated import WINDOW, forces_at, peaks_of, span
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.settings import by_number, settings_apart
 
 
-WINDOW = 0.05  # share of a stated velocity within which samples, or records, count as taken at it
 HELD = "Cut the part in which it is held, `process(between=(start, stop))`."
 
 
@@ -80,7 +80,7 @@ def evaluate(
     missed, found = _not_reached(velocities, settings, cycles, measurements, method, window)
     measurements, notes = measurements + found, missed + notes
     stated = tuple(sorted({m.velocity for m in measurements if m.velocity is not None}))
-    return Evaluation(tuple(measurements), settings, cycles, gas, stated, method, tuple(notes))
+    return Evaluation(tuple(measurements), settings, cycles, gas, stated, method, tuple(notes), window)
 
 
 def _check_options(velocities: Sequence[float] | None, method: str | None, window: float) -> None:
@@ -106,9 +106,9 @@ def _of_setting(
 ) -> list[Measurement]:
     """The figures of the records at one setting, its forces at the stated velocities, its rates and knees."""
     of_records = [m for run in runs for m in record_measurements(cycles[run.name], name, run.name)]
-    peaks = _peaks_of(name, runs, of_records)
+    peaks = peaks_of(name, runs, of_records)
     fastest = max(runs, key=lambda run: run.peak_velocity).name
-    at_velocities = _at_velocities(velocities, peaks, cycles[fastest], name, method, window)
+    at_velocities = forces_at(velocities, peaks, cycles[fastest], name, method, window)
     return [*of_records, *at_velocities, *curve.rates_and_knees(cycles[fastest], name, fastest)]
 
 
@@ -157,52 +157,6 @@ def _command(run: BenchRun) -> float:
     return -np.inf if run.command is None else run.command
 
 
-def _peak_forces(runs: Sequence[BenchRun], of_records: Sequence[Measurement], direction: str) -> list[curve.PeakForce]:
-    """Force at the peak velocity of a direction, one for each motion: repeated records are averaged."""
-    by = {(m.record, m.quantity): m for m in of_records}
-    peaks = []
-    for group in repeats(runs):
-        velocity = np.array([abs(by[run.name, f"{direction} velocity"].value) for run in group])
-        forces = [by[run.name, f"{direction} force"] for run in group]
-        value, between, count = measured(np.array([m.value for m in forces]))
-        within = [m.scatter for m in forces if m.scatter is not None]
-        parts = ([] if between is None else [between]) + (
-            [float(np.sqrt(np.mean(np.square(within))))] if within else []
-        )
-        if count and np.isfinite(velocity).all():
-            scatter = float(np.linalg.norm(parts)) if parts else None
-            peaks.append(curve.PeakForce(float(velocity.mean()), value, scatter))
-    return peaks
-
-
-def _at_velocities(
-    velocities: Sequence[float] | None,
-    peaks: Mapping[str, Sequence[curve.PeakForce]],
-    fastest: FoldedCycles,
-    setting: str,
-    method: str,
-    window: float,
-) -> list[Measurement]:
-    """Forces and their ratio at the stated velocities; without any stated, at those that the records reach."""
-    measurements = []
-    for velocity in curve.OEM_VELOCITIES if velocities is None else velocities:
-        forces = {}
-        for direction, sign in curve.DIRECTIONS.items():
-            if method == "loop":
-                forces[direction] = curve.on_loop(fastest, sign, velocity, window)
-            elif method == "window":
-                forces[direction] = curve.in_window(peaks[direction], velocity, window)
-            else:
-                forces[direction] = curve.interpolated(peaks[direction], velocity)
-        values = [force[0] for force in forces.values()]
-        if velocities is None and not np.isfinite(values).any():
-            continue
-        more = {"setting": setting, "velocity": float(velocity)}
-        measurements += [Measurement(f"{name} force", "N", *force, **more) for name, force in forces.items()]
-        measurements.append(Measurement("rebound/compression ratio", "", *_ratio(*forces.values()), **more))
-    return measurements
-
-
 def _not_reached(
     velocities: Sequence[float] | None,
     settings: Mapping[str, Sequence[BenchRun]],
@@ -216,8 +170,8 @@ def _not_reached(
     missed = [v for v in velocities or () if v not in reached]
     if not missed and (velocities is not None or reached):
         return [], []
-    peaks = {name: _peaks_of(name, runs, measurements) for name, runs in settings.items()}
-    low, high, where = _span(peaks, method)
+    peaks = {name: peaks_of(name, runs, measurements) for name, runs in settings.items()}
+    low, high, where = span(peaks, method)
     if velocities is not None:
         return [f"No force at {v:.4g} m/s: {where}." for v in missed], []
     found, instead = list[Measurement](), "Add records of other velocities."
@@ -227,35 +181,6 @@ def _not_reached(
         instead = f"Forces are stated at {velocity:.4g} m/s."
         for name, runs in settings.items():
             fastest = cycles[max(runs, key=lambda run: run.peak_velocity).name]
-            found += _at_velocities([velocity], peaks[name], fastest, name, method, window)
+            found += forces_at([velocity], peaks[name], fastest, name, method, window)
     usual = f"None of the usual velocities, from {curve.OEM_VELOCITIES[0]:g} m/s on, is reached"
     return [f"{usual}: {where}. {instead}"], found
-
-
-def _peaks_of(
-    setting: str, runs: Sequence[BenchRun], measurements: Sequence[Measurement]
-) -> dict[str, list[curve.PeakForce]]:
-    """Forces at the peak velocities of the records of a setting, by direction."""
-    of_records = [m for m in measurements if m.record and m.setting == setting]
-    return {direction: _peak_forces(runs, of_records, direction) for direction in curve.DIRECTIONS}
-
-
-def _span(peaks: Mapping[str, Mapping[str, Sequence[curve.PeakForce]]], method: str) -> tuple[float, float, str]:
-    """The lowest and highest velocity at which the records of all settings give a force, equal if at none; in words."""
-    spans = [[point.velocity for point in points] for both in peaks.values() for points in both.values() if points]
-    low, high = max(map(min, spans), default=0.0), min(map(max, spans), default=0.0)
-    low = 0.0 if method == "loop" else low
-    words = f"the records give forces from {low:.3g} to {high:.3g} m/s" if low < high else "the records enclose none"
-    return low, max(low, high), words
-
-
-def _ratio(
-    one: tuple[float, float | None, int], other: tuple[float, float | None, int]
-) -> tuple[float, float | None, int]:
-    """Ratio of the magnitudes of two forces; their scatters taken as independent."""
-    if not other[0]:
-        return float("nan"), None, 0
-    value = abs(one[0] / other[0])
-    has_scatter = one[1] is not None and other[1] is not None and one[0] != 0.0
-    scatter = float(value * np.hypot((one[1] or 0.0) / one[0], (other[1] or 0.0) / other[0])) if has_scatter else None
-    return value, scatter, min(one[2], other[2])
