@@ -3,12 +3,12 @@
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._types import State
 from jaxdamp.bench import BenchRun
 from jaxdamp.identify.initial_states import rest_window
@@ -68,7 +68,7 @@ def first_states(model: Model, runs: Sequence[BenchRun]) -> FirstStates:
     return FirstStates(*(np.stack([by_batch[at.batch][k][at.row] for at in ranges]) for k in range(3)))
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def _first_states(batch: Batch, model: Model, start: Array, stop: Array, target: Array) -> tuple[Array, Array, Array]:
     def one(
         dt: Array, x: Array, v: Array, followed: Followed, values: dict[str, Array], start: Array, stop: Array, y: Array

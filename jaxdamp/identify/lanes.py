@@ -3,11 +3,11 @@
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._triangles import rows_of_products
 from jaxdamp._types import Scalar
 from jaxdamp.identify.criteria import ROUNDS, SETTLED, Priors, Round
@@ -143,7 +143,7 @@ def judged(lanes: Lanes, end: SearchLanes, depends: Dependence | None) -> dict[s
     return named | {"record_rmse": tuple(by_record), "drift": drift}
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def _drift(free: FreeParameters, values: Float[Array, " free"], batch: Batch) -> Scalar:
     """Largest change of the states over the cycle before records that start in the periodic solution."""
     return jnp.max(batch.settled_forces(free.build(values))[1])

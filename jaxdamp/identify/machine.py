@@ -4,13 +4,13 @@ import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._types import Scalar
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, laws_inside
@@ -299,7 +299,7 @@ def force_at(law: AbstractDamper, velocity: float) -> float:
     return float(_force(law, jnp.asarray(np.asarray(velocity, float))))
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def _force(law: AbstractDamper, velocity: Float[Array, ""]) -> Scalar:
     return law.force(0.0, velocity, law.initial_state())
 

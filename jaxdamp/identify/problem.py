@@ -12,6 +12,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Bool, Float, Int, PyTree
 
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import Reach, laws_inside, margins
 from jaxdamp.parameters import Coordinates, FreeParameters
@@ -274,7 +275,7 @@ jax.tree_util.register_pytree_node(
 )
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def linearised(
     free: FreeParameters, values: Float[Array, " free"], residuals: Sequence[AbstractResiduals]
 ) -> tuple[Float[Array, " samples"], Float[Array, "samples free"]]:

@@ -14,6 +14,7 @@ from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._jacobian import with_jacobian
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table, plain
 from jaxdamp._types import Figure
@@ -114,10 +115,10 @@ def propagate(
     if samples is not None:
         if samples < 2:
             _checks.refuse("samples", "be 2 or more", samples)
-        value = np.asarray(eqx.filter_jit(of)(centre), float)
+        value = np.asarray(compiled_for_loops(of)(centre), float)
         return over_samples(of, jnp.asarray(evidence.draws(samples, seed), centre.dtype), value)
 
-    value, slopes = (np.asarray(a, float) for a in eqx.filter_jit(with_jacobian(of))(centre))
+    value, slopes = (np.asarray(a, float) for a in compiled_for_loops(with_jacobian(of))(centre))
     error = np.asarray(standard_error(slopes, evidence.covariance))
     return Propagated(value, error, value - evidence.quantile * error, value + evidence.quantile * error)
 

@@ -4,7 +4,6 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, final
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -12,6 +11,7 @@ from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._jacobian import with_jacobian
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Contents, Table
 from jaxdamp.identify.estimating import at_ends
@@ -188,7 +188,7 @@ def _check_curvature(hessian: np.ndarray, size: np.ndarray, names: np.ndarray) -
         _checks.refuse("result", "determine its free parameters", f"one that does not: {', '.join(flat)}", remedy)
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def _second_order(
     free: FreeParameters, values: Array, residuals: Sequence[AbstractResiduals]
 ) -> tuple[Array, Array, Array, Array]:
@@ -224,7 +224,7 @@ def _function(
         return jnp.stack([jnp.asarray(value, float) for value in by_name.values()])
 
     centre = jnp.asarray(values, evidence.problem.free.values.dtype)
-    at, slopes = eqx.filter_jit(with_jacobian(stacked))(centre)
+    at, slopes = compiled_for_loops(with_jacobian(stacked))(centre)
     return names, np.asarray(at, np.float64), np.asarray(slopes, np.float64)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float
 
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._status import Status
 from jaxdamp._triangles import triangle
 from jaxdamp.dampers import laws_inside, margins
@@ -181,7 +182,7 @@ def _linearised(problem: Problem, here: Here, reduced: np.ndarray) -> tuple[Line
     return Linearisation(rows[None], here.margins[None], here.slopes[None], np.array([float(len(whole))])), point
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def _evaluated(coordinates: Coordinates, y: Array, residuals: Sequence[AbstractResiduals]) -> tuple[Array, ...]:
     """Physical values, the Jacobian of the residual with it as last column, theirs by y, the margins and theirs."""
     values = coordinates.to_physical(y)

@@ -4,12 +4,12 @@ import dataclasses
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._types import Scalar
 from jaxdamp.bench import BenchRun, initial_temperature
 from jaxdamp.identify.initial_states import moving_samples
@@ -83,7 +83,7 @@ def warmed(model: Model, run: BenchRun, paths: Sequence[str], noise: float, init
     return Warmed(with_values(model, {path: value + shift for path, value in begin.items()}), told)
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def _shift(batch: Batch, model: Model, begin: dict[str, Array], noise: Scalar) -> Scalar:
     def missed(shift: Scalar) -> Float[Array, " samples"]:
         own = {path: jnp.broadcast_to(value + shift, batch.dt.shape) for path, value in begin.items()}

@@ -4,10 +4,10 @@ import dataclasses
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._results import Derived, drawn_by
 from jaxdamp._tables import Column, Contents, Table, with_unit
 from jaxdamp._warned import warn
@@ -196,7 +196,7 @@ class VehicleFit(Fit):
     plot = drawn_by("vehicle_fit", "Measured and fitted channels of a record over time, with residuals.")
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def predicted(batch: RideBatch, model: VehicleTest) -> Array:
     """What the sensors of a model show, in one program."""
     return batch.predict(model)

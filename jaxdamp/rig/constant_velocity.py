@@ -4,7 +4,6 @@ import functools
 from collections.abc import Hashable
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -12,6 +11,7 @@ from jaxtyping import Array, Bool, Float, Int, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import AbstractDamper, coverage
 from jaxdamp.parameters import as_float
@@ -151,7 +151,7 @@ def on_device(array: np.ndarray) -> Array:
     return jnp.asarray(array, array.dtype)
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def _held_by_xla(law: AbstractDamper, velocities: Array, states: Array, count: Int[Array, ""]) -> tuple[Array, Array]:
     """States and forces after so many more milliseconds at constant velocities."""
     zero, dt = jnp.zeros((), velocities.dtype), jnp.asarray(1e-3, velocities.dtype)

@@ -12,6 +12,7 @@ from jaxtyping import Array, ArrayLike, Complex, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._periodic import Shot, shoot, steady_state, with_derivatives
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._results import drawn_by
 from jaxdamp._sharded import varying_as
 from jaxdamp._steady_cycles import AbstractSteadyCycles, checked_points, is_steady, span
@@ -216,7 +217,7 @@ def _substeps(law: AbstractDamper, frequency: Array, samples: int, wanted: int |
     return max(count, 1)
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def _forces(
     law: AbstractDamper, frequency: Array, amplitude: Array, mean: Scalar, samples: int, substeps: int
 ) -> tuple[Float[Array, "... frequencies samples"], Shot]:

@@ -3,12 +3,12 @@
 import dataclasses
 from typing import NamedTuple, final
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array
 
 from jaxdamp import _checks
+from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._types import Number, Scalar, Signal, SignalLike, State
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import AbstractDeclared, Domain, as_float, nonnegative, parameter, positive, setting
@@ -238,7 +238,7 @@ def gas_and_friction(rig: Rig, stroke: Array, velocity: Array) -> tuple[Array, A
     return gas, rig.friction * jnp.tanh(velocity / rig.friction_velocity)
 
 
-@eqx.filter_jit
+@compiled_for_loops
 def _readings(
     rig: Rig,
     effects: tuple[str, ...],
