@@ -1,7 +1,7 @@
 """Limits of a specification, and whether measurements keep them."""
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -16,6 +16,7 @@ from jaxdamp._tables import Column, Table, plain
 from jaxdamp.bench.evaluation.curve import DIRECTIONS, Measurement, at_velocity
 from jaxdamp.bench.headers import split_header
 from jaxdamp.bench.layout import DELIMITERS, Layout, columns_of, split
+from jaxdamp.bench.raw import RawColumn
 from jaxdamp.bench.units import conversion, ratio
 
 
@@ -192,19 +193,23 @@ def read_limits(path: str | os.PathLike[str]) -> tuple[Limit, ...]:
     columns = columns_of(path, numbers, [rows], Layout(delimiter, len(names), numeric, numeric, 0)) if rows else []
     limits = []
     for row, (line, cells) in enumerate(zip(numbers, rows, strict=True)):
-        where, words = f"{path}, line {line}", dict(zip(names, cells, strict=True))
-        values: dict[str, float | None] = dict.fromkeys(NUMBERS)
+        read = {names[i]: columns[i] for i in numeric if cells[i]}
         try:
-            for name, column in ((names[i], columns[i]) for i in numeric if cells[i]):
-                if row in column.faults:
-                    raise ValueError(f"the {name} is {words[name]!r}, which is no number.")
-                size = _size(units[name], name, words["quantity"])
-                values[name] = float(np.asarray(column.values, float)[row]) * size
-            setting, record = words.get("setting") or "*", words.get("record", "")
-            limits.append(Limit(words["quantity"], **values, setting=setting, record=record))
+            limits.append(_limit(dict(zip(names, cells, strict=True)), read, row, units))
         except ValueError as error:
-            raise ValueError(f"{where}: {error}") from error
+            raise ValueError(f"{path}, line {line}: {error}") from error
     return tuple(limits)
+
+
+def _limit(cells: Mapping[str, str], columns: Mapping[str, RawColumn], row: int, units: Mapping[str, str]) -> Limit:
+    """The limit in a row: its cells, and the columns of which it has numbers."""
+    values: dict[str, float | None] = dict.fromkeys(NUMBERS)
+    for name, column in columns.items():
+        if row in column.faults:
+            raise ValueError(f"the {name} is {cells[name]!r}, which is no number.")
+        size = _size(units[name], name, cells["quantity"])
+        values[name] = float(np.asarray(column.values, float)[row]) * size
+    return Limit(cells["quantity"], **values, setting=cells.get("setting") or "*", record=cells.get("record", ""))
 
 
 def _columns(path: Path, top: str) -> tuple[str, dict[str, str]]:
