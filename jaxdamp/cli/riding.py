@@ -82,7 +82,7 @@ def parse_road(word: str, *, speed: float, duration: float, seed: int) -> Abstra
     """The road that a word on the command line means.
 
     "iso:C" is an ISO 8608 class, "bump:0.06:5" a cosine bump of height and length in metres that begins after a second,
-    anything else a file: OpenCRG (*.crg), or text with positions [m] and heights [m].
+    anything else a file: OpenCRG (*.crg), or text with positions and heights, in m or in the units of its header.
     """
     kind, _, rest = word.partition(":")
     if kind == "iso":

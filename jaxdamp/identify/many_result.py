@@ -205,11 +205,6 @@ class ManyFits(AbstractResult):
             if share > NOT_COUNTED + float(np.nanmedian(self.share_left_out)):
                 texts[i].append(f"{100.0 * share:.2g} % of its samples have less than half weight")
         for j, name in enumerate(self.parameters):
-            bias = np.zeros(len(self)) if self.bias is None else self.bias[:, j]
-            for i in np.flatnonzero(np.abs(bias) > self.standard_errors[:, j]):
-                unit = f" {self.free.owners[j].unit}".rstrip()
-                words = f"noise of stroke and velocity biases {name} by about {bias[i]:+.2g}{unit}"
-                texts[i].append(words)
             values = self.values[fitted, j]
             expected, scores = _trend(values, settings), _robust_scores(values, settings)
             apart = np.abs(values - expected)
@@ -217,7 +212,15 @@ class ManyFits(AbstractResult):
             for k in np.flatnonzero(sure):
                 unit = f" {self.free.owners[j].unit}".rstrip()
                 texts[fitted[k]].append(f"{name} = {values[k]:.4g}{unit} where the others suggest {expected[k]:.4g}")
-        return tuple("; ".join(text) for text in texts)
+        return tuple("; ".join([*text, *self._biased(i)]) for i, text in enumerate(texts))
+
+    def _biased(self, i: int) -> list[str]:
+        """The numbers of a damper that the noise of stroke and velocity biases by more than their standard errors."""
+        if self.bias is None:
+            return []
+        numbers = zip(self.parameters, self.free.owners, self.bias[i], self.standard_errors[i], strict=True)
+        words = "noise of stroke and velocity biases {} by about {:+.2g} {}"
+        return [words.format(name, bias, p.unit).rstrip() for name, p, bias, error in numbers if abs(bias) > error]
 
     @functools.cached_property
     def _fitted(self) -> np.ndarray:
