@@ -59,6 +59,7 @@ def bench_command(
         screen.remarks(evaluation.notes, style="yellow")
         if check is not None:
             screen.table(check.table())
+            screen.remarks(check.warnings, style="yellow")
         if beneath is not None:
             screen.table(baseline_table(evaluation, beneath))
         with work.saving("Tables") as draft:
