@@ -85,10 +85,10 @@ def test_a_table_of_a_law_with_a_command_says_at_which(law: Path) -> None:
         in jaxdamp("export", folder / "clicks.json", "--to", "adams").output
     )
     words = ("export", folder / "clicks.json", "--to", "csv", "--velocities", "-1:1:3", "--command")
-    assert "At command 6 of 2 to 10;" in jaxdamp(*words, 6).output
+    assert "At command 6 of 2 to 10;" in jaxdamp(*words, "6").output
     text = (folder / "clicks.csv").read_text()
     assert "# at command 6 of 2 to 10\n" in text and text.endswith("\n1.0,1200.0\n")
-    assert "Option --command must stay between the levels 2 and 10" in refused(folder, *words, 20, "--replace")
+    assert "Option --command must stay between the levels 2 and 10" in refused(folder, *words, "20", "--replace")
     assert "Option --command must be left out" in refused(folder, "export", law, "--to", "csv", "--command", "6")
     assert "Option --command must be left out for c" in refused(folder, "export", law, "--to", "c", "--command", "6")
 

@@ -57,14 +57,14 @@ def test_a_ride_says_at_which_command_its_dampers_are(law: Path, tmp_path: Path)
     clicks = Scheduled((Linear(900.0), Linear(1500.0)), levels=[2.0, 10.0], command=2.0)
     words = ["ride", "quarter_car_000", "bump:0.05:4", "--duration", "1", "--out", tmp_path / "ride", "--command"]
     start = ["--start", _written(clicks, tmp_path / "clicks.json")]
-    assert "law: at command 6 of 2 to 10." in jaxdamp(*words, 6, *start).output
+    assert "law: at command 6 of 2 to 10." in jaxdamp(*words, "6", *start).output
     assert "at command 6 of 2 to 10" in (tmp_path / "ride" / "report.html").read_text()
     assert float(from_json(tmp_path / "ride" / "law.json").command) == 6.0
     heading, *_, last = (tmp_path / "ride" / "channels_law.csv").read_text().splitlines()
     assert heading.startswith("time [s],") and "damper_force [N]" in heading and "sprung_acceleration [m/s²]" in heading
     assert float(last.split(",")[0]) == pytest.approx(1.0)
-    assert "--command must stay between the levels 2 and 10" in refused(tmp_path, *words, 20, *start, "--replace")
-    assert "--command must be left out beside a law" in refused(tmp_path, *words, 6, "--start", law, "--replace")
+    assert "--command must stay between the levels 2 and 10" in refused(tmp_path, *words, "20", *start, "--replace")
+    assert "--command must be left out beside a law" in refused(tmp_path, *words, "6", "--start", law, "--replace")
 
 
 @pytest.mark.parametrize(
