@@ -174,7 +174,8 @@ def with_chunk(traced: Traced, mesh: Mesh, chunk: int, level: Level = None) -> P
     rounds_done = jax.ShapeDtypeStruct((), np.dtype(np.int32), sharding=everywhere)
     static = _Static(traced._replace(arrays=[], fingerprint=str), layout)
     options = options_of(level, mesh.devices.flat[0].platform)
-    return Program(traced, layout, arrays, _jitted(static).lower(arrays, point, rounds_done).compile(options))
+    lowered = _jitted(static).lower(arrays, point, rounds_done)
+    return Program(traced, layout, arrays, lowered.compile(options))  # pyright: ignore[reportArgumentType]
 
 
 @final
