@@ -48,6 +48,7 @@ _AMOUNT = re.compile(
 )
 _SIGNED = re.compile(
     r"(mid-stroke |stated )?(rebound |compression |mean |static |gas |least |largest )?(force|velocity|stroke)( at .*)?"
+    r"|(\w+_)?working_space_mean"
 )
 _ENDS = (("lowest", "highest"), ("fitted from", "fitted to"), ("least force", "largest force"), ("from", "to"))
 _ENDS += (("minimum", "maximum"),)

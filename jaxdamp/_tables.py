@@ -117,7 +117,7 @@ class Table:
 
     def _row_shown(self, present: Display, row: tuple[Cell, ...]) -> tuple[Cell, ...]:
         by_name = dict(zip((column.name for column in self.columns), row, strict=True))
-        unit, quantity = str(by_name.get("unit", "")), str(by_name.get("quantity", ""))
+        unit, quantity = str(by_name.get("unit", "")), str(by_name.get("quantity") or by_name.get("metric", ""))
         cells = [
             _cell_shown(present, column, cell, unit, quantity) for column, cell in zip(self.columns, row, strict=True)
         ]

@@ -48,7 +48,10 @@ def test_lowest_and_highest_change_places_with_the_sign():
     ends = Table("", (Column("run"), Column("least force", "N"), Column("largest force", "N")), (("a", -300.0, 700.0),))
     rows = (("velocity", "m/s", -0.5, 0.9), ("frequency", "Hz", 1.0, 5.0))
     spans = Table("", (Column("quantity"), Column("unit"), Column("lowest"), Column("highest")), rows)
+    metrics = (("front_working_space_mean", "m", -0.01, 0.02), ("rms_stroke", "m", 0.01, 0.01))
+    ride = Table("", (Column("metric"), Column("unit"), Column("before"), Column("after")), metrics)
     with shown_in(Display("SI", "compression-positive")):
+        assert ride.shown().rows == (("front_working_space_mean", "m", 0.01, -0.02), metrics[1])
         assert ends.shown().rows == (("a", -700.0, 300.0),)
         assert spans.shown().rows == (("velocity", "m/s", -0.9, 0.5), ("frequency", "Hz", 1.0, 5.0))
 

@@ -16,7 +16,7 @@ from jaxdamp.cli.records import Reading
 from jaxdamp.cli.riding import USUAL, parse_road
 from jaxdamp.cli.vehicle_words import commanded, parse_vehicle, read_law, read_module
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.export.simulator_tables import command_words
+from jaxdamp.export import command_words
 from jaxdamp.vehicles import AbstractVehicle
 
 

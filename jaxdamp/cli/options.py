@@ -111,8 +111,9 @@ def _written(argument: Argument, leaf: Leaf | None = None) -> Written | type | N
     many = [written for kind in kinds for pattern, written in offers.TYPES if re.match(pattern, kind)]
     plain = [PLAIN[kind] for kind in kinds if kind in PLAIN]
     owned = f"{leaf.owner} {name}" if leaf else name
-    if owned in offers.WRITTEN or name in offers.WRITTEN:
-        return offers.WRITTEN.get(owned) or offers.WRITTEN[name]
+    for key in (owned, name):
+        if key in offers.WRITTEN:
+            return offers.WRITTEN[key]
     if many:
         return offers.NAMES_OR_NUMBERS if str in plain and "Sequence[float]" in kinds else many[0]
     for kind in (Path, float, int, str, bool):

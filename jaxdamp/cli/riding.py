@@ -23,7 +23,7 @@ from jaxdamp.cli.vehicle_words import (
     with_dampers_at,
 )
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.export.simulator_tables import command_words
+from jaxdamp.export import command_words
 from jaxdamp.parameters import match_paths, named_parameters
 from jaxdamp.report import Table, axles_sentence, notes_of, ride_report, ride_tables, ride_verdict
 from jaxdamp.roads import AbstractRoad, WhiteRoad
@@ -171,8 +171,7 @@ def ride(
     if not isinstance(surface, AbstractRoad):
         refuse_road(road)
     run["duration"] = driving.duration or surface.duration or USUAL  # an iso road in full
-    passive = {name: command_words(car) for name, car in cars.items() if car.passive is car}
-    commands = [f"{name}: {at}." for name, at in passive.items() if at]
+    commands = _at_commands(cars)
     screen.points(commands)
     screen.points(unusual(road, driving.speed), style="yellow")
     with job(screen, "ride", output) as work:
@@ -199,6 +198,12 @@ def ride(
             write_tables(draft, tables)
             plots.animation(responses, draft / "animation.html", title=title)
         work.page(ride_report, responses, title=title, laws=laws, remarks=[*commands, *remarks])
+
+
+def _at_commands(cars: Mapping[str, AbstractVehicle]) -> list[str]:
+    """At which command the dampers of each car are that no controller sets."""
+    passive = {name: command_words(car) for name, car in cars.items() if car.passive is car}
+    return [f"{name}: {at}." for name, at in passive.items() if at]
 
 
 def show_ride(screen: Screen, responses: Mapping[str, Response]) -> dict[str, Table]:

@@ -31,8 +31,7 @@ from jaxdamp.parameters import match_paths, modules_inside, named_parameters
 from jaxdamp.report import MOST_POINTS, Table, best_points, sweep_report, tuning_report
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import stationary_notes
-from jaxdamp.sweeps import without_effect
-from jaxdamp.sweeps.axes import grid
+from jaxdamp.sweeps import grid, without_effect
 from jaxdamp.tune import Run, Status, TuneResult, limit_spans
 from jaxdamp.vehicles import AbstractVehicle
 

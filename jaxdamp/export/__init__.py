@@ -5,7 +5,14 @@ from jaxdamp.export.c_source import to_c
 from jaxdamp.export.explorer_page import to_explorer
 from jaxdamp.export.fmu import to_fmu
 from jaxdamp.export.module_file import from_json, to_json
-from jaxdamp.export.simulator_tables import to_adams, to_assetto_corsa, to_carsim, to_csv, to_matlab
+from jaxdamp.export.simulator_tables import (
+    command_words as command_words,
+    to_adams,
+    to_assetto_corsa,
+    to_carsim,
+    to_csv,
+    to_matlab,
+)
 
 
 __all__ = [

@@ -13,8 +13,7 @@ from jaxdamp.plots import _style, fitted_range
 from jaxdamp.plots._rides import without_answer
 from jaxdamp.plots.rides import default_channels
 from jaxdamp.rig import quasi_static
-from jaxdamp.tune import ParetoFront, TuneResult, limit_spans
-from jaxdamp.tune.verdict import change_in_percent
+from jaxdamp.tune import ParetoFront, TuneResult, change_in_percent, limit_spans
 from jaxdamp.vehicles import AbstractVehicle
 
 

@@ -1,8 +1,8 @@
 """A page on a sweep: a table of all points, and a curve or a map of each result."""
 
 import functools
-from collections.abc import Mapping, Sequence
-from typing import Any, Unpack
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Unpack
 
 import numpy as np
 
@@ -83,17 +83,10 @@ def best_points(
     names = [str(name) for name in data.data_vars if data[name].dims == dims]
     axes = [str(name) for name in data.coords if name not in ("failed", "reason") and set(data[name].dims) & set(dims)]
     spans = limit_spans(limits, names)
-    allowed = ~data["failed"]
-    for name, (lower, upper) in spans.items():
-        allowed = allowed & (data[name] >= lower) & (data[name] <= upper)
+    allowed = _within(data, spans)
     count, total = int(allowed.sum()), int(allowed.size)
     idle = without_effect(data)
-    sentences = [
-        f"{path_words(over)} has no effect on {path_words(name)}: no value of it is better than another."
-        for name, flat in idle.items()
-        for over in flat
-    ]
-    smallest = []
+    sentences, smallest = _on_idle(idle), []
     for name in names if count else ():
         acting = [axis for axis in axes if axis not in idle.get(name, ())]
         smallest += [_smallest(data, name, acting, allowed, baseline)] if acting else []
@@ -101,6 +94,23 @@ def best_points(
         best = f"; {smallest.pop(0)}" if smallest else "." if count else f"{_nearest(data, axes, spans)}."
         sentences.insert(0, f"{count} of {total} points are within all limits{best}")
     return [*sentences, *map(first_upper, smallest)]
+
+
+def _within(data: Dataset, spans: Mapping[str, tuple[float, float]]) -> DataArray:
+    """Which points are driven and within all limits."""
+    allowed = ~data["failed"]
+    for name, (lower, upper) in spans.items():
+        allowed = allowed & (data[name] >= lower) & (data[name] <= upper)
+    return allowed
+
+
+def _on_idle(idle: Mapping[str, Sequence[str]]) -> list[str]:
+    """A sentence on each axis that does not change a result."""
+    return [
+        f"{path_words(over)} has no effect on {path_words(name)}: no value of it is better than another."
+        for name, flat in idle.items()
+        for over in flat
+    ]
 
 
 def _nearest(data: Dataset, axes: Sequence[str], spans: Mapping[str, tuple[float, float]]) -> str:
@@ -139,7 +149,7 @@ def _smallest(
     return f"smallest {path_words(name)}: {_in_words(data, name, values.min())} at {where}.{widen}"
 
 
-def _where(data: Dataset, axes: Sequence[str], place: Mapping[Any, DataArray]) -> str:
+def _where(data: Dataset, axes: Sequence[str], place: Mapping[Hashable, DataArray]) -> str:
     return ", ".join(f"{path_words(axis)} = {_in_words(data, axis, place[axis])}" for axis in axes)
 
 

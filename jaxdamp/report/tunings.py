@@ -12,8 +12,7 @@ from jaxdamp._traced import equal
 from jaxdamp.parameters import get
 from jaxdamp.report.page import PAGE, Page, Report
 from jaxdamp.simulation import Response, Ride
-from jaxdamp.tune import Rescore, TuneResult, damper_paths
-from jaxdamp.tune.verdict import change_in_percent
+from jaxdamp.tune import Rescore, TuneResult, change_in_percent, damper_paths
 from jaxdamp.vehicles import AbstractVehicle
 
 

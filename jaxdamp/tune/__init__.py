@@ -33,7 +33,11 @@ from jaxdamp.tune.settings import Design, Run, Search
 from jaxdamp.tune.shape import damper_paths as damper_paths, knee, monotone, ratio, slope
 from jaxdamp.tune.valving_result import ValvingResult as ValvingResult
 from jaxdamp.tune.valving_search import valving
-from jaxdamp.tune.verdict import Outcome as Outcome, half_interval as half_interval
+from jaxdamp.tune.verdict import (
+    Outcome as Outcome,
+    change_in_percent as change_in_percent,
+    half_interval as half_interval,
+)
 
 
 __all__ = [
