@@ -1,7 +1,7 @@
 """Records that begin at other temperatures: prediction of a new one, stated starts, and whether heat helps."""
 
 import dataclasses
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 import pytest
@@ -15,11 +15,19 @@ from jaxdamp.parameters import get, replace
 from jaxdamp.rig import Rig
 
 
+class How(TypedDict):
+    """Keywords of all fits here."""
+
+    freeze: list[str]
+    samples_per_cycle: int
+    starts: int
+
+
 NOISE = 10.0  # N
 COLD = Bilinear(2600.0, 1500.0) + CoulombFriction(60.0, 0.02)
 DAMPER = Heated(COLD, sensitivity=0.004, cooling_time=300.0, heat_capacity=400.0)
 BEGIN = Heated(Bilinear(2000.0, 2000.0) + CoulombFriction(30.0, 0.02), 0.002, 200.0, heat_capacity=400.0)
-HOW: dict[str, Any] = {"freeze": ["static_force_slope", "friction_velocity"], "samples_per_cycle": 50, "starts": 1}
+HOW: How = {"freeze": ["static_force_slope", "friction_velocity"], "samples_per_cycle": 50, "starts": 1}
 MOTIONS = [(0.0, 0.03, 1.0), (15.0, 0.03, 2.0), (30.0, 0.02, 3.0), (8.0, 0.015, 1.5)]  # K, m, Hz
 TRUE = {"rebound_rate": 2600.0, "compression_rate": 1500.0, "friction_force": 60.0, "sensitivity": 0.004}
 
