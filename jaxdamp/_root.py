@@ -28,7 +28,7 @@ def increasing_root(
     upper: Scalar,
     steps: int = 12,
     likely: int = 0,
-    close: float = 1e-7,
+    close: float | None = 1e-7,
 ) -> Scalar:
     """Solve function(w) = 0 by Newton steps kept inside a shrinking bracket.
 
@@ -47,7 +47,8 @@ def increasing_root(
         upper: where the function is not negative.
         steps: largest number of safe steps.
         likely: number of plain Newton steps that are likely to be enough for a good guess; 0 for safe steps only.
-        close: relative length of the last step; the remaining error is about its square.
+        close: relative length of the last step; the remaining error is about its square. None takes all safe steps, so
+            that the loop of a batch has no end of its own for each element, which printed programs do not have.
     """
     closed = jax.make_jaxpr(function)(guess)  # once: it is called by the steps and by each of the derivatives
 
@@ -75,11 +76,18 @@ def increasing_root(
 
     def solved(constants: list[Array], bracket: tuple[Scalar, ...]) -> tuple[Scalar, tuple[()]]:
         w, low, high = bracket
+
+        def one_more(_: Array, before: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
+            after, rest = differentiable_step(constants, before)
+            return after, *rest
+
         never = jnp.full_like(w, jnp.inf)
+        if close is None:
+            return jax.lax.fori_loop(0, steps, one_more, varying_as((w, low, high, never, never)))[0], ()
         near = 1e-16 * (high - low)
 
         def moved(old: Scalar, new: Scalar) -> Bool[Array, ""]:
-            return jnp.abs(new - old) > close * jnp.abs(new) + near
+            return jnp.abs(new - old) > close * jnp.abs(new) + near  # pyright: ignore[reportOptionalOperand]
 
         def going(now: PyTree) -> Bool[Array, ""]:
             count, still_moving, _ = now

@@ -109,7 +109,12 @@ class AbstractSeries(AbstractWrapper):
         zero = jnp.zeros_like(locked)
         reach = self.largest_deflection(locked, self.shared_at_rest(zero))
         total = increasing_root(
-            lambda total: self.force_at_rest(total) - law_force(x - total), zero, -reach, reach, steps=MOST_STEPS
+            lambda total: self.force_at_rest(total) - law_force(x - total),
+            zero,
+            -reach,
+            reach,
+            steps=MOST_STEPS,
+            close=None,
         )
         return joined([jnp.stack(self.shared_at_rest(total)), law.state_at_rest(x - total)])
 

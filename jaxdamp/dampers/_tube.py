@@ -99,7 +99,7 @@ class AbstractTube(AbstractDamper):
             return self.gas.pressure + rise - self._gas_pressure(self._gas_stroke(x, *deflections(rise)))
 
         most = self._gas_pressure(x) - self.gas.pressure  # by the rod alone; the oil yields to it
-        rise = increasing_root(surplus, most, at_most(most, 0.0), at_least(most, 0.0), steps=20)
+        rise = increasing_root(surplus, most, at_most(most, 0.0), at_least(most, 0.0), steps=20, close=None)
         return jnp.stack(deflections(rise))
 
     @abstractmethod
