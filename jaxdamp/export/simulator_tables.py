@@ -99,6 +99,9 @@ def settled_table(law: AbstractDamper, velocities: VectorLike, call: str, *, tur
 def command_words(module: AbstractDamper | AbstractVehicle) -> str:
     """At which command the laws of a module are, and between which it can be; empty where none takes one.
 
+    Arguments:
+        module: a law or a vehicle.
+
     >>> from jaxdamp.dampers import Linear, Scheduled
     >>> command_words(Scheduled((Linear(900.0), Linear(1500.0)), levels=[2.0, 10.0], command=6.0))
     'at command 6 of 2 to 10'

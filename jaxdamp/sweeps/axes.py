@@ -234,6 +234,9 @@ def as_points(over: object) -> AbstractPoints:
 def grid(over: Mapping[str, object]) -> Grid:
     """Every combination of the values of the axes.
 
+    Arguments:
+        over: the values of each axis, in the unit of its parameter.
+
     Raises:
         ValueError: an axis with a value twice.
     """

@@ -137,7 +137,14 @@ def signed_metrics(result: "TuneResult[AbstractVehicle]") -> set[str]:
 
 
 def change_in_percent(result: "TuneResult[AbstractVehicle]", name: str, before: float, after: float) -> float | None:
-    """The change of a metric [%]; none from zero, and none of one that may be negative."""
+    """The change of a metric [%]; none from zero, and none of one that may be negative.
+
+    Arguments:
+        result: of the tuning.
+        name: of the metric.
+        before: its value at the start, in its unit.
+        after: its value at the end, in its unit.
+    """
     return None if name in signed_metrics(result) else percent_change(before, after)
 
 
