@@ -7,8 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from jaxdamp import _unit_registry
 from jaxdamp._checks import ArgumentError, Setting
-from jaxdamp._unit_registry import unit_registry
 
 
 SI = {"time": "s", "stroke": "m", "velocity": "m/s", "force": "N", "temperature": "K", "command": "A"}
@@ -109,7 +109,7 @@ def conversion(role: str, written: str) -> Conversion | None:
     if any(text in units for units in _KNOWN.values()):
         factor = _KNOWN.get(role, {}).get(text)
         return None if factor is None else Conversion(text, factor)
-    registry = unit_registry()  # not within `try`: that it does not start says nothing of the text
+    registry = _unit_registry.unit_registry()  # not within `try`: that it does not start says nothing of the text
     try:
         unit = registry.Unit(text)
         zero, one, two = (registry.Quantity(x, unit).to(SI[role]).magnitude for x in (0.0, 1.0, 2.0))
@@ -150,11 +150,7 @@ def ratio(written: str, other: str) -> float | None:
     one, two = (next((units for units in _KNOWN.values() if text in units), {}) for text in (written, other))
     if one and two:
         return one[written] / two[other] if one is two else None
-    registry = unit_registry()
-    try:
-        return float(registry.Quantity(1.0, written.strip()).to(other.strip()).magnitude)
-    except Exception:  # as in `conversion`
-        return None
+    return _unit_registry.ratio(written, other)
 
 
 def named_conversion(role: str, written: str, where: str) -> Conversion:

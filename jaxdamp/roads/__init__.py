@@ -47,10 +47,12 @@ from jaxdamp.roads.base import AbstractRoad, Columns as Columns
 from jaxdamp.roads.bump import cosine_bump, pothole, step
 from jaxdamp.roads.contact import contact_patch, rolling_disc
 from jaxdamp.roads.cornered_bump import half_sine_bump, trapezoid_bump, triangular_bump
+from jaxdamp.roads.crg import read_crg
 from jaxdamp.roads.harmonic import sine, sweep_sine, wave_course
 from jaxdamp.roads.iso_roughness import iso8608
-from jaxdamp.roads.profile import from_profile, read_crg, read_profile
+from jaxdamp.roads.profile import from_profile
 from jaxdamp.roads.random_roads import WhiteRoad as WhiteRoad, band_limited, iso8608_filtered, white
+from jaxdamp.roads.road_file import read_profile
 from jaxdamp.roads.tracks import coherency, two_track
 
 
