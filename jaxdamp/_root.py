@@ -76,22 +76,15 @@ def increasing_root(
 
     def solved(constants: list[Array], bracket: tuple[Scalar, ...]) -> tuple[Scalar, tuple[()]]:
         w, low, high = bracket
-
-        def one_more(_: Array, before: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
-            after, rest = differentiable_step(constants, before)
-            return after, *rest
-
         never = jnp.full_like(w, jnp.inf)
-        if close is None:
-            return jax.lax.fori_loop(0, steps, one_more, varying_as((w, low, high, never, never)))[0], ()
-        near = 1e-16 * (high - low)
+        least, near = close or 0.0, 1e-16 * (high - low)
 
         def moved(old: Scalar, new: Scalar) -> Bool[Array, ""]:
-            return jnp.abs(new - old) > close * jnp.abs(new) + near  # pyright: ignore[reportOptionalOperand]
+            return jnp.abs(new - old) > least * jnp.abs(new) + near
 
         def going(now: PyTree) -> Bool[Array, ""]:
             count, still_moving, _ = now
-            return still_moving & (count < steps)
+            return count < steps if close is None else still_moving & (count < steps)
 
         def again(now: PyTree) -> PyTree:
             count, _, before = now

@@ -15,8 +15,7 @@ from jaxdamp.cli.options import Call
 from jaxdamp.cli.records import Reading
 from jaxdamp.cli.riding import USUAL, parse_road
 from jaxdamp.cli.vehicle_words import commanded, parse_vehicle, read_law, read_module
-from jaxdamp.dampers import AbstractDamper
-from jaxdamp.export import command_words
+from jaxdamp.dampers import AbstractDamper, command_words
 from jaxdamp.vehicles import AbstractVehicle
 
 

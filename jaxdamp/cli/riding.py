@@ -22,8 +22,7 @@ from jaxdamp.cli.vehicle_words import (
     read_law,
     with_dampers_at,
 )
-from jaxdamp.dampers import AbstractDamper
-from jaxdamp.export import command_words
+from jaxdamp.dampers import AbstractDamper, command_words
 from jaxdamp.parameters import match_paths, named_parameters
 from jaxdamp.report import Table, axles_sentence, notes_of, ride_report, ride_tables, ride_verdict
 from jaxdamp.roads import AbstractRoad, WhiteRoad

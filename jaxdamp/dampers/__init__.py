@@ -12,7 +12,6 @@ from jaxdamp.dampers.base import (
     AbstractMemoryless,
     AbstractStateful,
     AbstractStateless,
-    laws_inside as laws_inside,
 )
 from jaxdamp.dampers.besinger import Besinger
 from jaxdamp.dampers.bilinear import Bilinear
@@ -52,6 +51,7 @@ from jaxdamp.dampers.inside import (
     command_paths as command_paths,
     coverage as coverage,
     keeps_conditions as keeps_conditions,
+    laws_inside as laws_inside,
     margins as margins,
     require_finite_force as require_finite_force,
     values_at_start as values_at_start,
@@ -81,7 +81,7 @@ from jaxdamp.dampers.range_use import (
     with_standard_errors as with_standard_errors,
 )
 from jaxdamp.dampers.saturating import Saturating
-from jaxdamp.dampers.scheduled import Scheduled
+from jaxdamp.dampers.scheduled import Scheduled, command_words as command_words
 from jaxdamp.dampers.segmented_polynomial import SegmentedPolynomial
 from jaxdamp.dampers.series_spring import SeriesSpring
 from jaxdamp.dampers.spline_table import SplineTable

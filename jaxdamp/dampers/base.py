@@ -27,7 +27,7 @@ from jaxdamp.dampers.contract import (
     starts_of_bends,
 )
 from jaxdamp.dampers.fitted_range import FittedRange, Motion, RangeNote, StandardError
-from jaxdamp.parameters import Module, check_parameters, modules_inside, readable
+from jaxdamp.parameters import Module, check_parameters, readable
 
 
 class AbstractDamper(Module):
@@ -341,16 +341,6 @@ class AbstractStateful(AbstractDamper):
         """Heun's second-order step."""
         rate = self.state_rate(x0, v0, state)
         return state + 0.5 * dt * (rate + self.state_rate(x1, v1, state + dt * rate))
-
-
-def laws_inside(tree: object, prefix: str = "") -> list[tuple[str, AbstractDamper]]:
-    """All laws in a law, a vehicle or another module, each with the prefix of the paths of its parameters.
-
-    Arguments:
-        tree: the module.
-        prefix: put before the path of each law.
-    """
-    return [(path, law) for path, law in modules_inside(tree, prefix) if isinstance(law, AbstractDamper)]
 
 
 def refuse_states(argument: str, law: AbstractDamper, remedy: str) -> None:

@@ -7,8 +7,18 @@ from jaxtyping import Array, ArrayLike, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import ScalarLike
-from jaxdamp.dampers.base import AbstractDamper, laws_inside
-from jaxdamp.parameters import declared_inside
+from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.parameters import declared_inside, modules_inside
+
+
+def laws_inside(tree: object, prefix: str = "") -> list[tuple[str, AbstractDamper]]:
+    """All laws in a law, a vehicle or another module, each with the prefix of the paths of its parameters.
+
+    Arguments:
+        tree: the module.
+        prefix: put before the path of each law.
+    """
+    return [(path, law) for path, law in modules_inside(tree, prefix) if isinstance(law, AbstractDamper)]
 
 
 def command_paths(tree: object, prefix: str = "") -> list[str]:

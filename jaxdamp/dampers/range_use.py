@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 from jaxdamp import _checks
 from jaxdamp._traced import is_traced, of_known_numbers
 from jaxdamp._warned import warn
-from jaxdamp.dampers.base import AbstractDamper, laws_inside
+from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.fitted_range import (
     UNITS,
     FittedRange,
@@ -23,7 +23,7 @@ from jaxdamp.dampers.fitted_range import (
     span,
     without_standard_errors,
 )
-from jaxdamp.dampers.inside import command_paths
+from jaxdamp.dampers.inside import command_paths, laws_inside
 from jaxdamp.parameters import get
 
 

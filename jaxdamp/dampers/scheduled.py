@@ -6,6 +6,7 @@ from typing import final
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
@@ -15,9 +16,10 @@ from jaxdamp._types import Number, ScalarLike, Vector
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.contract import Traits, combined_traits
 from jaxdamp.dampers.fitted_range import without_fitted_ranges
+from jaxdamp.dampers.inside import command_paths
 from jaxdamp.dampers.sum import Scaled, Sum
 from jaxdamp.dampers.wrapper import AbstractWrapper
-from jaxdamp.parameters import Domain, increasing, interval, real, setting
+from jaxdamp.parameters import Domain, get, increasing, interval, modules_inside, real, setting
 
 
 BLENDS = ("parameters", "force")
@@ -152,3 +154,19 @@ class Scheduled(AbstractWrapper):
     def side_by_side(self) -> tuple[AbstractDamper, ...]:
         """The terms of the law at the command."""
         return self.inner_law().side_by_side()
+
+
+def command_words(module: object) -> str:
+    """At which command the laws of a module are, and between which it can be; empty where none takes one.
+
+    Arguments:
+        module: a law or a vehicle.
+
+    >>> from jaxdamp.dampers import Linear
+    >>> command_words(Scheduled((Linear(900.0), Linear(1500.0)), levels=[2.0, 10.0], command=6.0))
+    'at command 6 of 2 to 10'
+    """
+    laws = ((path, law) for path, law in modules_inside(module) if isinstance(law, Scheduled))
+    spans = {f"{path}command": " of {:g} to {:g}".format(*np.asarray(law.levels)[[0, -1]]) for path, law in laws}
+    said = [f"{float(get(module, path)):g}{spans.get(path, '')}" for path in command_paths(module)]
+    return f"at command {' and '.join(dict.fromkeys(said))}" if said else ""

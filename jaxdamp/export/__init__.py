@@ -6,7 +6,6 @@ from jaxdamp.export.explorer_page import to_explorer
 from jaxdamp.export.fmu import to_fmu
 from jaxdamp.export.module_file import from_json, to_json
 from jaxdamp.export.simulator_tables import (
-    command_words as command_words,
     to_adams,
     to_assetto_corsa,
     to_carsim,

@@ -14,10 +14,8 @@ from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import VectorLike
 from jaxdamp._warned import warn
 from jaxdamp._writing import write_whole
-from jaxdamp.dampers import AbstractDamper, Scheduled, command_paths, extrapolated, without_fitted_ranges
-from jaxdamp.parameters import get, modules_inside
+from jaxdamp.dampers import AbstractDamper, extrapolated, without_fitted_ranges
 from jaxdamp.rig import quasi_static, respond
-from jaxdamp.vehicles import AbstractVehicle
 
 
 @of_known_numbers
@@ -94,22 +92,6 @@ def settled_table(law: AbstractDamper, velocities: VectorLike, call: str, *, tur
     settled = velocity[curve.settled]
     comments += _range_lines(law, settled, turned=turned)
     return SettledTable(settled, np.asarray(curve.force)[curve.settled], comments, curve.note)
-
-
-def command_words(module: AbstractDamper | AbstractVehicle) -> str:
-    """At which command the laws of a module are, and between which it can be; empty where none takes one.
-
-    Arguments:
-        module: a law or a vehicle.
-
-    >>> from jaxdamp.dampers import Linear, Scheduled
-    >>> command_words(Scheduled((Linear(900.0), Linear(1500.0)), levels=[2.0, 10.0], command=6.0))
-    'at command 6 of 2 to 10'
-    """
-    laws = ((path, law) for path, law in modules_inside(module) if isinstance(law, Scheduled))
-    spans = {f"{path}command": " of {:g} to {:g}".format(*np.asarray(law.levels)[[0, -1]]) for path, law in laws}
-    said = [f"{float(get(module, path)):g}{spans.get(path, '')}" for path in command_paths(module)]
-    return f"at command {' and '.join(dict.fromkeys(said))}" if said else ""
 
 
 def warn_of_rows(written: Path, table: SettledTable) -> None:

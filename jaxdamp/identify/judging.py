@@ -178,9 +178,10 @@ def _averaged(problem: Problem, best: SearchEnd) -> tuple[str, ...]:
     """A sentence on each number of the law of which records have values that differ by more than `ALIKE`."""
     tree, said = problem.free.started_at(best.values).tree, []
     units = {p.path: p.unit for p in parameters(tree)}
-    for path in set(problem.per_record).difference(start_paths(tree)):
+    left_out = ("rig.", *start_paths(tree))
+    for path in problem.per_record:
         values = np.asarray(get(tree, path))
-        if not path.startswith("rig.") and np.ptp(values) > ALIKE * abs(np.mean(values)):
+        if not path.startswith(left_out) and np.ptp(values) > ALIKE * abs(np.mean(values)):
             spread = f"{values.min():.4g} to {values.max():.4g} {units[path]}".rstrip()
             said.append(
                 f"{path} of the law is the mean over the records, {np.mean(values):.4g}, whose values are {spread}: "

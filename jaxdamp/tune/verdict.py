@@ -9,9 +9,10 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp._status import Status
-from jaxdamp._tables import percent_change, typeset_unit
+from jaxdamp._tables import typeset_unit
 from jaxdamp.metrics import Metric
 from jaxdamp.solve import Evaluation
+from jaxdamp.tune.changes import change_in_percent, mean_change, signed_metrics
 from jaxdamp.tune.limits import Limit, LimitRange
 from jaxdamp.tune.objective import Objective, exact_counterpart
 from jaxdamp.tune.ranges import FACTOR, Change, SearchRange
@@ -128,32 +129,6 @@ def _price(result: "TuneResult[AbstractVehicle]") -> tuple[float, str]:
 def _has_price(metric: Metric, vehicle: AbstractVehicle) -> bool:
     """Whether a rise of a metric is a price."""
     return not metric.statistic.signed and vehicle.layout.by_name[metric.channel].kind in PRICED
-
-
-def signed_metrics(result: "TuneResult[AbstractVehicle]") -> set[str]:
-    """Names of the metrics that may be negative, of which a change in percent says nothing."""
-    known = (*result.start.layout.metrics, *(result.objective.metrics if result.objective else ()))
-    return {metric.name for metric in known if metric.statistic.signed}
-
-
-def change_in_percent(result: "TuneResult[AbstractVehicle]", name: str, before: float, after: float) -> float | None:
-    """The change of a metric [%]; none from zero, and none of one that may be negative.
-
-    Arguments:
-        result: of the tuning.
-        name: of the metric.
-        before: its value at the start, in its unit.
-        after: its value at the end, in its unit.
-    """
-    return None if name in signed_metrics(result) else percent_change(before, after)
-
-
-def mean_change(result: "TuneResult[AbstractVehicle]", name: str) -> float | None:
-    """The change of a metric [%], the mean on fresh roads if there are any; none as of `change_in_percent`."""
-    if result.fresh is None or name not in result.fresh.before or name in signed_metrics(result):
-        return change_in_percent(result, name, result.before[name], result.after[name])
-    change = 100.0 * float(np.mean(result.fresh.change(name)))
-    return change if np.isfinite(change) else None
 
 
 def at_limit(result: "TuneResult[AbstractVehicle]", name: str) -> str:
