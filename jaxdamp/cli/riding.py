@@ -170,7 +170,7 @@ def ride(
     if not isinstance(surface, AbstractRoad):
         refuse_road(road)
     run["duration"] = driving.duration or surface.duration or USUAL  # an iso road in full
-    commands = _at_commands(cars)
+    commands = at_commands(cars)
     screen.points(commands)
     screen.points(unusual(road, driving.speed), style="yellow")
     with job(screen, "ride", output) as work:
@@ -199,7 +199,7 @@ def ride(
         work.page(ride_report, responses, title=title, laws=laws, remarks=[*commands, *remarks])
 
 
-def _at_commands(cars: Mapping[str, AbstractVehicle]) -> list[str]:
+def at_commands(cars: Mapping[str, AbstractVehicle]) -> list[str]:
     """At which command the dampers of each car are that no controller sets."""
     passive = {name: command_words(car) for name, car in cars.items() if car.passive is car}
     return [f"{name}: {at}." for name, at in passive.items() if at]

@@ -21,9 +21,9 @@ from jaxdamp.cli.controlling import Controlling
 from jaxdamp.cli.jobs import Output, job, write_json, write_tables
 from jaxdamp.cli.limits import axes_in_si, bounds_in_si, in_si
 from jaxdamp.cli.options import Call
-from jaxdamp.cli.riding import Driving, beyond_vehicles, unusual
+from jaxdamp.cli.riding import Driving, at_commands, beyond_vehicles, unusual
 from jaxdamp.cli.signatures import Arguments
-from jaxdamp.cli.vehicle_words import parse_vehicle, read_baseline, read_law, write_laws
+from jaxdamp.cli.vehicle_words import parse_vehicle, read_baseline, read_law, with_dampers_at, write_laws
 from jaxdamp.cli.words import Axis, Limit
 from jaxdamp.control import Controlled
 from jaxdamp.dampers import Scheduled
@@ -222,6 +222,7 @@ def sweep_command(
     limit: Mapping[str, Limit] | None = None,
     driving: Driving,
     how: Annotated[Call, "sweeps.sweep"],
+    command: float | None = None,
     baseline: Path | None = None,
     block: str | None = None,
     resume: bool = False,
@@ -238,11 +239,12 @@ def sweep_command(
         over: axes.
         metric: comfort, travel, grip, or names of ride metrics.
         limit: limits.
+        command: what is set on the dampers, such as clicks or a coil current; that of their laws if left out.
         baseline: to compare with: another law, or another tuning's vehicle.json, as JSON.
         block: compute this part of the sweep only, into a store; pip install 'jaxdamp[cluster]'.
     """
     store = output.store("sweep")
-    car = parse_vehicle(vehicle)(None if start is None else read_law("start", start))
+    car = with_dampers_at(parse_vehicle(vehicle)(None if start is None else read_law("start", start)), command)
     (surface,), run = driving.over(road)
     white = isinstance(surface, WhiteRoad)
     stated, said = in_si(limit or {}, car, white=white)
@@ -254,7 +256,7 @@ def sweep_command(
     ride = Ride(car, surface, metrics=names, **run)
     axes = grid(axes_in_si(over, car)).values
     ride({name: values[0] for name, values in axes.items() if not ride.out_of_domain({name: values[:1]})[0]})
-    screen.points(said)
+    screen.points([*said, *at_commands({"vehicle": car})])
     screen.points(unusual(road, driving.speed), style="yellow")
     if block is not None:
         sweep_part(screen, ride, axes, how, store, block)

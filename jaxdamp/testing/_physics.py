@@ -154,9 +154,13 @@ def check_derivatives(law: AbstractDamper) -> None:
 
 
 def check_step(law: AbstractDamper) -> None:
-    """The law's own step converges with second order to its rates integrated by an independent solver."""
+    """The law's own step converges with second order to its rates integrated by an independent solver.
+
+    In the states of `state_at_rest`, in which vehicles start, nothing moves.
+    """
     if law.initial_state().size == 0:
         return
+    _check_states_at_rest(law)
     from scipy.integrate import solve_ivp
 
     free, frequency, peak = free_parameters(law), 9.0, 0.4
@@ -181,6 +185,15 @@ def check_step(law: AbstractDamper) -> None:
     remedy = "States faster than the step need an exact or implicit `advance`."
     require(errors[0] < 0.02, f"`advance` {errors_text}. {remedy}")
     require(errors[2] < max(errors[0] / 8, 1e-7), f"`advance` {errors_text}, which decrease too slowly. {remedy}")
+
+
+def _check_states_at_rest(law: AbstractDamper) -> None:
+    """The states of a damper that is held at a stroke stay as they are, beside their rates in motion."""
+    held, still, moving = (jnp.asarray(number, float) for number in (0.003, 0.0, 0.3))
+    state = law.state_at_rest(held)
+    drift, rate = (np.abs(rates(law, held, v, state)) for v in (still, moving))
+    message = f"Held at x = 3 mm the states of `state_at_rest` change with rates of {drift}"
+    require(np.all(drift <= 1e-6 * (rate + np.max(rate))), f"{message}, in motion of {rate}: define the method.")
 
 
 def check_prediction(law: AbstractDamper) -> None:

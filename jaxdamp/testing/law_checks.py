@@ -198,7 +198,8 @@ def check_law(law: AbstractDamper, *, leave_out: Collection[str] = ()) -> None:
     - `"compiled"`, `"batched"`, `"single precision"`: the same numbers compiled (to 1e-12, derivatives to 1e-9), in a
       batch, and in single precision.
     - `"derivatives"`: forward mode, reverse mode and differences agree in every parameter.
-    - `"step"`, `"prediction"`: the step converges with second order to an independent integration of the rates.
+    - `"step"`, `"prediction"`: the step converges with second order to an independent integration of the rates, and
+      the states at rest stay.
     - `"inside wrappers"`, `"alike ports"`: it works in every wrapper, and twice in a half car with different
       parameters.
 

@@ -97,6 +97,13 @@ class _FixedStep(_Lagging):
         return state + 1e-3 * self.state_rate(x1, v1, state)
 
 
+class _Unsettled(_Lagging):
+    """A spring behind a lag, in which a vehicle would start without the force of the spring."""
+
+    def state_rate(self, x, v, state):
+        return super().state_rate(x, v + x, state)
+
+
 class _WrongPrediction(_Lagging):
     """A lag that is predicted to be where it was."""
 
@@ -214,6 +221,7 @@ class _Deaf(AbstractMemoryless):
         (_WithoutGradient, "derivatives"),
         (_Nameless, "parameters"),
         (_FixedStep, "step"),
+        (_Unsettled, "step"),
         (_WrongPrediction, "prediction"),
         (_SaysItAnswers, "traits"),
         (_SaysItIsLinear, "traits"),

@@ -8,6 +8,7 @@ from jaxdamp._display import Display, display, shown_in
 from jaxdamp.report import sweep_report
 from jaxdamp.report.sweeps import MOST_POINTS, best_points
 from jaxdamp.sweeps import without_effect
+from tests.sweeps.cases import AXES
 
 
 def product(point):
