@@ -16,7 +16,7 @@ _TERMS = 13  # of the Taylor series at a norm of one half or less: its rest is b
 
 
 @jax.jit
-def solve(matrix: Inexact[Array, "n n"], right: Inexact[Array, "n *columns"]) -> Inexact[Array, "n *columns"]:
+def solve(matrix: Inexact[Array, "n n"], right: Inexact[Array, " n *columns"]) -> Inexact[Array, " n *columns"]:
     """X of A X = B for a small regular matrix, by elimination with row exchange; differentiable in both."""
     matrix, right = varying_as((matrix, right))
     if matrix.shape[0] == 1:

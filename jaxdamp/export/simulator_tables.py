@@ -14,7 +14,7 @@ from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import VectorLike
 from jaxdamp._warned import warn
 from jaxdamp._writing import write_whole
-from jaxdamp.dampers import AbstractDamper, extrapolated, without_fitted_ranges
+from jaxdamp.dampers import AbstractDamper, command_words, extrapolated, without_fitted_ranges
 from jaxdamp.rig import quasi_static, respond
 
 

@@ -50,8 +50,8 @@ class Priors(AbstractResiduals):
     """Prior knowledge of parameters as residuals."""
 
     paths: tuple[str, ...] = eqx.field(static=True)
-    mean: Float[Array, "priors *numbers"]
-    deviation: Float[Array, "priors *numbers"]
+    mean: Float[Array, " priors *numbers"]
+    deviation: Float[Array, " priors *numbers"]
     size: int = eqx.field(static=True)  # numbers of all parameters together
     noise: Float[Array, ""]  # standard deviation of the noise of a weighted sample
     weak: bool = eqx.field(static=True, default=False)  # whether they only determine what the records do not

@@ -173,7 +173,7 @@ def test_usual_headers_are_read_without_pint(head, tmp_path, monkeypatch):
 
     for cached in (units.conversion, units.is_unit, units.ratio):
         cached.cache_clear()
-    monkeypatch.setattr(units, "unit_registry", refused)
+    monkeypatch.setattr("jaxdamp._unit_registry.unit_registry", refused)
     more: dict = (
         {"units": {"time": "s", "stroke": "mm"}, "gains": {"force": "500 N/V"}} if "Zeit,Weg,Kraft_V" in head else {}
     )

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from jaxdamp._unit_registry import unit_registry
 from jaxdamp.bench import read, units
 from jaxdamp.bench.units import gain_conversion
 
@@ -69,10 +70,10 @@ def test_a_broken_library_of_units_is_no_unknown_unit(monkeypatch: pytest.Monkey
         raise TypeError("cannot inherit frozen dataclass from a non-frozen one")
 
     monkeypatch.setattr("pint.UnitRegistry", broken)
-    units.unit_registry.cache_clear()
+    unit_registry.cache_clear()
     try:
         for convert in (lambda: units.conversion("force", "hectonewton"), lambda: units.ratio("hectovolt", "V")):
             with pytest.raises(TypeError, match="frozen dataclass"):
                 convert()
     finally:
-        units.unit_registry.cache_clear()
+        unit_registry.cache_clear()

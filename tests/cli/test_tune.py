@@ -211,7 +211,7 @@ WRONG = [
     (["sweep", "quarter_car_000", "white:C", "--over", "rate=1:2:x"], "NAME=FIRST:LAST:COUNT"),
     (["sweep", "quarter_car_000", "white:C", "--over", "rate=1:2:0"], "have one value or more"),
     (["sweep", "quarter_car_000", "white:C", "--over", "rate=1;1"], "--over of 'rate' must have each value once"),
-    (["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--command", "3"], "--command must be left out beside a law that"),
+    (["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--command", "3"], "must be left out beside a law"),
     (["sweep", "quarter_car_000", "white:C", "--over", "rate=1 N s/m;2"], "each with its unit or all in SI"),
     (["sweep", "quarter_car_000", "white:C", "--over", "rate=1mm;2mm"], "in a unit of rate, such as N s/m"),
     (["sweep", "quarter_car_000", "white:C", "--over", "rat=1;2"], "did you mean 'rate'"),
