@@ -13,7 +13,7 @@ from jaxdamp import _checks
 from jaxdamp._quickly import compiled_quickly
 from jaxdamp._types import Number, Scalar
 from jaxdamp.control.actuator import RateLimit
-from jaxdamp.control.levels import forces_at, laws_at_levels, scheduled_in
+from jaxdamp.control.levels import forces_at, laws_at_levels, scheduled_in, takes_command
 from jaxdamp.control.loop import ControlLoop
 from jaxdamp.control.policies import AbstractPolicy
 from jaxdamp.control.sensors import Sensors
@@ -155,15 +155,29 @@ def _forces_at_levels(car: AbstractVehicle, velocity: Scalar) -> dict[str, Float
     """Of each damper that takes a command, its force at a velocity at all levels, with the same states."""
     forces = {}
     for name, law in zip(car.layout.ports, car.elements(), strict=True):
-        if len(scheduled_in(law)) == 1:
+        if takes_command(law):
             forces[name] = forces_at(laws_at_levels(law), velocity)
     return forces
+
+
+def _repeated(frame: Frame, system: System, dampers: Sequence[str]) -> tuple[tuple[int, int], ...]:
+    """The ports of lift-off of wheels that stand on a commanded damper, whose law they repeat, and its number."""
+    pairs = []
+    for wheel in (wheel for wheel in frame.wheels if wheel.lifts):
+        commanded = [dampers.index(name) for name in wheel.element_names if name in dampers]
+        if commanded:
+            port = system.layout.ports.index(wheel.element_names[-1])
+            if len(scheduled_in(system.laws[port])) > 1:
+                must = "have one damper that takes a command at each wheel that lifts"
+                _checks.refuse("car", must, f"several at {wheel.name!r}", "Let the wheel not lift.")
+            pairs.append((port, commanded[0]))
+    return tuple(pairs)
 
 
 @compiled_quickly
 def _controlled_system(vehicle: Controlled, layout: Layout) -> System:
     system, frame = vehicle.car.system(), vehicle.car.frame()
-    takes = [name for name, law in zip(system.layout.ports, system.laws, strict=True) if len(scheduled_in(law)) == 1]
+    takes = [name for name, law in zip(system.layout.ports, system.laws, strict=True) if takes_command(law)]
     dampers, policy = vehicle.commanded(takes)
     if not dampers:
         _checks.refuse("car", "have a damper that takes a command, for its controller", ", ".join(system.layout.ports))
@@ -188,6 +202,7 @@ def _controlled_system(vehicle: Controlled, layout: Layout) -> System:
         vehicle.delay,
         vehicle.sensors_of(dampers),
         vehicle.rate_limit,
+        _repeated(frame, system, dampers),
     )
     more = 2 * len(ports)  # commands and demands stand behind the forces
     wide = LinearMap(

@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper, Scheduled
+from jaxdamp.vehicles.frame import LiftOffWithLaws
 
 
 HELD, STEPS = 0.2, 200  # s, and steps, in which friction and hysteresis at a velocity settle
@@ -21,6 +22,11 @@ def interpolated(law: AbstractDamper, command: Scalar) -> AbstractDamper:
 def scheduled_in(law: AbstractDamper) -> list[Scheduled]:
     """The `Scheduled` laws in the law of an element."""
     return [node for node in jax.tree.leaves(law, is_leaf=_scheduled) if _scheduled(node)]
+
+
+def takes_command(law: AbstractDamper) -> bool:
+    """Whether a controller commands the law of an element; a lift-off repeats the laws of its wheel."""
+    return len(scheduled_in(law)) == 1 and not isinstance(law, LiftOffWithLaws)
 
 
 def laws_at_levels(law: AbstractDamper) -> list[AbstractDamper]:

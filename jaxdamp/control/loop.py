@@ -102,6 +102,7 @@ class ControlLoop(eqx.Module):
         delay: [s].
         sensors: of each damper that has some.
         rate_limit: of the actuators.
+        repeated: the ports of lift-off that repeat the law of a damper, each with the number of that damper.
     """
 
     policy: AbstractVehiclePolicy
@@ -120,11 +121,13 @@ class ControlLoop(eqx.Module):
     delay: float = eqx.field(static=True)
     sensors: tuple[Sensors | None, ...] = ()
     rate_limit: RateLimit | None = None
+    repeated: tuple[tuple[int, int], ...] = eqx.field(static=True, default=())
 
     def laws(self, laws: Sequence[AbstractDamper], command: Commands) -> tuple[AbstractDamper, ...]:
         """The law at each port, the dampers at their commands."""
         changed = list(laws)
-        for port, u in zip(self.ports, command, strict=True):
+        repeated = [(port, command[number]) for port, number in self.repeated]
+        for port, u in [*zip(self.ports, command, strict=True), *repeated]:
             changed[port] = interpolated(laws[port], u)
         return tuple(changed)
 

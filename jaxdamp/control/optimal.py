@@ -5,7 +5,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp.control.controlled import rows_of
-from jaxdamp.control.levels import scheduled_in
+from jaxdamp.control.levels import takes_command
 from jaxdamp.control.policies import StateFeedback
 from jaxdamp.control.together import VehicleFeedback
 from jaxdamp.vehicles import AbstractVehicle
@@ -66,7 +66,7 @@ def state_space(car: AbstractVehicle) -> tuple[np.ndarray, np.ndarray, np.ndarra
         car: as in `lqr`.
     """
     system, frame = car.system(), car.frame()
-    taking = [i for i, law in enumerate(system.laws) if len(scheduled_in(law)) == 1]
+    taking = [i for i, law in enumerate(system.laws) if takes_command(law)]
     form, n = system.form, len(taking)
     body, _, _, wheel, _ = (np.asarray(part) for part in rows_of(frame, form.ports[np.array(taking, dtype=int)]))
     moves, stretches = np.concatenate([body, wheel]), np.concatenate([body - wheel, wheel])

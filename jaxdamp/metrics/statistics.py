@@ -172,7 +172,7 @@ class Statistic:
             raise
 
 
-_ON_THE_ROAD = -1.0 + 1e-9  # relative tyre load; rounding counts as lifted
+_ROUNDING = 16.0  # of the relative tyre load, in the precision of its numbers: so near to -1 the wheel is lifted
 
 
 def _mean_square(gathered: Gathered, count: int, _: ScalarLike) -> Scalar:
@@ -189,7 +189,8 @@ def _stress(deviation: Scalar) -> Scalar:
 
 
 def _lifted(y: Samples, _: Scalar | None) -> Samples:
-    return jnp.where(jnp.isnan(y), y, (y <= _ON_THE_ROAD).astype(y.dtype))
+    lifted = y <= -1.0 + max(1e-9, _ROUNDING * float(jnp.finfo(y.dtype).eps))
+    return jnp.where(jnp.isnan(y), y, lifted.astype(y.dtype))
 
 
 def _power(gathered: Gathered, count: int, _: ScalarLike) -> Scalar:

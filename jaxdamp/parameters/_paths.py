@@ -114,7 +114,7 @@ def replace(tree: Tree, values: Mapping[str, object]) -> Tree:
     """The same tree with other values at the given paths (last parts and patterns as in `free_parameters`).
 
     Values outside their domain are refused, and so are all values that a constructor refuses: violated conditions
-    between several parameters, or of a wrapper on the law inside (see `checked`).
+    between several parameters, or of a wrapper on the law inside (see `checked`); and two values of one parameter.
 
     Arguments:
         tree: the tree.
@@ -125,9 +125,15 @@ def replace(tree: Tree, values: Mapping[str, object]) -> Tree:
     2000.0
     """
     known = named_parameters(tree, values)
-    return checked(
-        with_values(tree, {p: as_float(v) for name, v in values.items() for p in match_parameters(known, [name])})
-    )
+    by_path: dict[str, object] = {}
+    named: dict[str, str] = {}
+    for name, value in values.items():
+        for path in match_parameters(known, [name]):
+            if path in named:
+                both = f"{named[path]!r} and {name!r}, which both name {path}"
+                _checks.refuse("values", "name each parameter once", both, "Write the paths of all of them.")
+            named[path], by_path[path] = name, as_float(value)
+    return checked(with_values(tree, by_path))
 
 
 def named_parameters(tree: object, names: Iterable[str]) -> list[Parameter]:

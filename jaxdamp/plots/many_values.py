@@ -87,7 +87,7 @@ def rescore(result: Rescore) -> Figure:
     Arguments:
         result: of `tune.rescore`.
     """
-    names = [name for name, before in result.before.items() if np.all(before > 0)]
+    names = [name for name in result.units if np.all(result.before[name] > 0)]
     rows = np.arange(len(names), dtype=float)
     figure = _style.new_figure(8.5, 1.6 + 0.35 * len(names))
     axes = figure.subplots()

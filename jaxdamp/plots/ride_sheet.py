@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from jaxdamp._display import display
+from jaxdamp._tables import percent_change
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Figure
 from jaxdamp.plots import _ride_panels, _ride_spectra, _rides, _sheet, _style
@@ -80,7 +81,7 @@ def _changes(shown: _rides.Rides) -> str:
     for goal, words in _rides.GOALS.items():
         if names := shown.goal(goal):
             before, after = (float(np.mean([side[name] for name in names])) for side in shown.values)
-            change = _style.percent(100.0 * (after / before - 1.0)) if before else "–"
+            change = "–" if (percent := percent_change(before, after)) is None else _style.percent(percent)
             said.append(f"{words} {_style.quantity(after, shown.units[names[0]]) if shown.single else change}")
     first, last = map(_style.in_words, shown.names)
     return _style.first_upper(f"{last} against {first}: " * (not shown.single) + ", ".join(said))

@@ -65,6 +65,15 @@ class Limit(NamedTuple):
         return f"{sign} {end:.4g} {typeset_unit(self.unit)}".rstrip()
 
 
+def in_scenarios(name: str, scenarios: Sequence[str]) -> list[str]:
+    """The names of the values of one metric in every scenario; itself where there are none.
+
+    >>> in_scenarios("grip", ["empty", "laden"])
+    ["grip in 'empty'", "grip in 'laden'"]
+    """
+    return [f"{name} in {scenario!r}" for scenario in scenarios] or [name]
+
+
 def limit_spans(
     limits: Limits | None, known: Sequence[str], start: Mapping[str, float] | None = None
 ) -> dict[str, Span]:

@@ -1,7 +1,7 @@
 """What a tuning computes of a vehicle: metrics on one road or over scenarios, in one compiled program."""
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple, final
 
@@ -19,8 +19,9 @@ from jaxdamp._types import Scalar
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.roads import WhiteRoad
 from jaxdamp.simulation import Ride, moves_axles
+from jaxdamp.tune.limits import in_scenarios
 from jaxdamp.tune.objective import Objective
-from jaxdamp.tune.scenario_ride import ScenarioRide
+from jaxdamp.tune.scenario_ride import ScenarioRide, exact
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import RUN, Run
 from jaxdamp.tune.shape import ShapeNumbers
@@ -91,12 +92,18 @@ class Measurement(eqx.Module):
 
     def entries(self, name: str) -> list[str]:
         """The names of the values of one metric in every scenario; itself on one road."""
-        return [f"{name} in {scenario!r}" for scenario in self.scenario_names] or [name]
+        return in_scenarios(name, self.scenario_names)
 
     def each(self, vehicle: AbstractVehicle) -> dict[str, Array]:
         """The metrics and the objective of a vehicle in each scenario, shape (scenarios,)."""
         assert isinstance(self.ride, ScenarioRide)
         return self.objective.of_each(self.ride.of_vehicle(vehicle).each())
+
+    def reported(self, each: Mapping[str, Array]) -> dict[str, float]:
+        """The metrics of `each` as they are printed: joined by the true risk, not by the smooth one of a search."""
+        assert isinstance(self.ride, ScenarioRide)
+        risk, weights = exact(self.ride.risk), self.ride.weights
+        return {name: float(risk(jnp.asarray(values), weights)) for name, values in each.items()}
 
     def __call__(self, vehicle: AbstractVehicle) -> dict[str, Scalar]:
         """The metrics and the objective of a vehicle by name; those of scenarios by their risk, and some in each."""

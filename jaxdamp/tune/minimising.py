@@ -17,13 +17,14 @@ from jaxdamp.solve import Evaluation
 from jaxdamp.tune.combinations import Combinations, beside_next
 from jaxdamp.tune.combining import Driven, every_combination, rank
 from jaxdamp.tune.descending import Descent, Ended, missed, reached
+from jaxdamp.tune.fresh_limits import in_each, lost_limits
 from jaxdamp.tune.limits import Limit, LimitEnd, LimitRange, limit_ends
 from jaxdamp.tune.measuring import ride_on
 from jaxdamp.tune.objective import Function, check_objective
 from jaxdamp.tune.ranges import start_points
 from jaxdamp.tune.rescoring import Rescore, driver, on_fresh_roads
 from jaxdamp.tune.result import Attempt, Drive, ScenarioValues, TuneResult, V
-from jaxdamp.tune.scenario_ride import ScenarioRide, exact
+from jaxdamp.tune.scenario_ride import ScenarioRide
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import DEFAULTS, Settings
 from jaxdamp.tune.task import DesignTask, Evaluator, check_call, is_white
@@ -32,7 +33,6 @@ from jaxdamp.tune.verdict import (
     bound_notes,
     early_end,
     effect_notes,
-    lost_limits,
     missed_notes,
     start_notes,
     tightened_notes,
@@ -127,19 +127,20 @@ def minimise(
         descent = combining or Descent(evaluator, settings["max_steps"], progress)
         several = descent.search(starts, evaluations, limits)
         ended, tighter = _best(descent, several, limits), limits
-        fresh = _on_fresh_roads(evaluator, (task.space.start, ended.values), range(fresh_roads), task.allowed)
+        allowed = in_each(task.allowed, task.measured.scenario_names)
+        fresh = _on_fresh_roads(evaluator, (task.space.start, ended.values), range(fresh_roads), allowed)
         for again in range(1, TIGHTENED + 1):
             now_reached = task.numbers(ended.evaluation.values)
             met = not missed(limits, now_reached, task.tolerance)
-            excess = lost_limits(fresh, task.allowed) if met else {}
+            excess = lost_limits(fresh, allowed) if met else {}
             if not excess:
                 break
-            tighter = [limit.tightened(excess.get(limit.of, 0.0), now_reached[limit.name]) for limit in tighter]
+            tighter = [limit.tightened(excess.get(limit.name, 0.0), now_reached[limit.name]) for limit in tighter]
             again_from = descent.search([ended.values / task.space.unit], [ended.evaluation], tighter)
             closer = _best(descent, again_from, tighter)
             ended = closer._replace(history=ended.history + closer.history)
             others = range(again * fresh_roads, (again + 1) * fresh_roads)
-            fresh = _on_fresh_roads(evaluator, (task.space.start, ended.values), others, task.allowed)
+            fresh = _on_fresh_roads(evaluator, (task.space.start, ended.values), others, allowed)
         attempts = _attempts(task, starts, several, limits) if len(several) > 1 else ()
         result = _result(task, evaluations[0], ended, attempts, (limits, tighter), fresh, settings)
     combinations = None if combining is None else _beside_next(evaluator, combining.combinations(tighter), fresh_roads)
@@ -230,7 +231,7 @@ def _result(
         before=MetricValues.with_units(reported[0], units),
         after=MetricValues.with_units(reported[1], units),
         units=units,
-        limits=task.shown_limits(before),
+        limits=task.shown_limits(reported[0]),
         active_limits=tuple(dict.fromkeys(limit.of for limit in held if not limit.is_shape)),
         warnings=tuple(dict.fromkeys(notes + runs)),
         status=status,
@@ -267,7 +268,8 @@ def _on_fresh_roads(
         return [task.numbers(row) for row in evaluator.program.at(designs, ride).values]
 
     of_scenarios = isinstance(task.road, Scenarios)  # whose true risk counts, not a smooth one
-    drive = driver(cars, task.objective.metrics, task.objective, task.run) if of_scenarios else by_search
+    by_risk = driver(cars, task.objective.metrics, task.objective, task.run, list(task.allowed))
+    drive = by_risk if of_scenarios else by_search
     name = task.objective.name
     return on_fresh_roads(drive, (cars, task.run), task.road, numbers, allowed, task.units, name)
 
@@ -280,9 +282,7 @@ def _in_scenarios(
     if not isinstance(measured.ride, ScenarioRide):
         return None, [{name: values[name] for name in names} for values in (before, after)]
     sides = [{n: np.asarray(x, float) for n, x in measured.each(car).items()} for car in (task.vehicle, tuned)]
-    risk, weights = exact(measured.ride.risk), measured.ride.weights
-    joined = [{name: float(risk(jnp.asarray(side[name]), weights)) for name in names} for side in sides]
-    return ScenarioValues(measured.scenario_names, *sides), joined
+    return ScenarioValues(measured.scenario_names, *sides), [measured.reported(side) for side in sides]
 
 
 def _where(task: DesignTask[AbstractVehicle], fresh_roads: int) -> str:

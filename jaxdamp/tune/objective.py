@@ -24,7 +24,7 @@ from jaxdamp.metrics import (
     settling_time,
     smooth_settling_time,
 )
-from jaxdamp.tune.limits import Limits
+from jaxdamp.tune.limits import Ends, Limits
 from jaxdamp.vehicles import AbstractVehicle, is_stationary
 
 
@@ -243,10 +243,15 @@ def goal_limits(
     """Limits with "comfort", "travel" and "grip" spelled out: each metric of a goal gets its limit."""
     if not isinstance(limits, Mapping):
         return limits
-    spelled = {}
+    spelled: dict[str | Metric, Ends] = {}
+    given: dict[str | Metric, str | Metric] = {}
     for one, span in limits.items():
         names = metrics_of("limits", one, vehicle, white=white) if isinstance(one, str) and one not in known else [one]
-        spelled |= dict.fromkeys(names, span)
+        for name in names:
+            if name in given:
+                both = f"{given[name]!r} and {one!r}, which both limit {name}"
+                _checks.refuse("limits", "limit each metric once", both, "Write the names of all metrics.")
+            spelled[name], given[name] = span, one
     return spelled
 
 

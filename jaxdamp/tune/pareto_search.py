@@ -5,6 +5,7 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Unpack
 
+import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
@@ -13,6 +14,7 @@ from jaxdamp._settings import with_defaults
 from jaxdamp._status import Status
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, current_name
+from jaxdamp.simulation import Ride
 from jaxdamp.solve import SearchState
 from jaxdamp.tune.descending import missed
 from jaxdamp.tune.front import FrontParameter, ParetoFront, non_dominated, shares_of
@@ -22,6 +24,7 @@ from jaxdamp.tune.objective import Function, check_objective, exact_counterpart
 from jaxdamp.tune.ranges import SearchRange, start_points
 from jaxdamp.tune.rescoring import other_roads
 from jaxdamp.tune.result import V
+from jaxdamp.tune.scenario_ride import ScenarioRide, smooth_in_scenarios
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import DEFAULTS, Settings
 from jaxdamp.tune.task import DesignTask, Evaluator, check_call
@@ -109,10 +112,13 @@ def pareto(
     chosen, status, notes = _judged(states, problem)
     designs = np.array([np.clip(state.y * space.unit, space.lower, space.upper) for state in chosen])
     numbers = dict(zip(task.names, np.array([state.evaluation.values for state in chosen]).T, strict=True))
-    worst = {name: float(numbers[name].max() + BEYOND * np.ptp(numbers[name])) for name in names}
     filled = between if len(chosen) > len(names) else 0
     if filled:
         designs, numbers = _with_designs_between(evaluator, designs, numbers, limits, between)
+    if smooth_in_scenarios(task.measured.ride):
+        designs, numbers = _best_of(names, designs, _by_true_risk(task, designs, numbers))
+        before = task.measured.reported(task.measured.each(vehicle))
+    worst = {name: float(numbers[name].max() + BEYOND * np.ptp(numbers[name])) for name in names}
     fresh, start_on_fresh = _on_fresh_roads(evaluator, designs, settings["fresh_roads"])
     front = ParetoFront[V](
         start=vehicle,
@@ -131,9 +137,9 @@ def pareto(
         dropped=len(states) - len(chosen),
         free=space.free,
         measured=task.measured,
-        fresh=fresh,
+        fresh={name: fresh[name] for name in task.units if fresh},
     )
-    return dataclasses.replace(front, warnings=(*notes, *_notes_on_points(front, task, start_on_fresh)))
+    return dataclasses.replace(front, warnings=(*notes, *_notes_on_points(front, task, fresh, start_on_fresh)))
 
 
 def _parameters(space: SearchRange) -> tuple[FrontParameter, ...]:
@@ -218,7 +224,10 @@ def _at_bounds(best: Sequence[SearchState], task: DesignTask[AbstractVehicle]) -
 
 
 def _notes_on_points(
-    front: ParetoFront, task: DesignTask[AbstractVehicle], start_on_fresh: Mapping[str, np.ndarray]
+    front: ParetoFront,
+    task: DesignTask[AbstractVehicle],
+    fresh: Mapping[str, np.ndarray],
+    start_on_fresh: Mapping[str, np.ndarray],
 ) -> list[str]:
     """Limits that the points do not keep by their true values or on fresh roads; doubts about step and fitted ranges.
 
@@ -232,15 +241,15 @@ def _notes_on_points(
             true = front.values[exact[name].name]
             if beyond := int(np.sum(~((lower <= true) & (true <= upper)))):
                 notes.append(f"{name} is limited, but the true {exact[name].name} is beyond at {beyond} points.")
-        if front.fresh:
-            fresh = front.fresh[name]
-            ends = np.array([allowed.at(float(start)) for start in start_on_fresh[name]])
-            above, below = fresh > ends[:, 1:], fresh < ends[:, :1]
-            if (outside := above | below | np.isnan(fresh)).any():
+        for entry in task.measured.entries(name) if fresh else ():
+            values = fresh[entry]
+            ends = np.array([allowed.at(float(start)) for start in start_on_fresh[entry]])
+            above, below = values > ends[:, 1:], values < ends[:, :1]
+            if (outside := above | below | np.isnan(values)).any():
                 places = f"{int(outside.any(axis=0).sum())} of {len(front)} points"
-                furthest = fresh.max() if above.any() else fresh.min()
+                furthest = values.max() if above.any() else values.min()
                 notes.append(
-                    f"On {int(outside.any(axis=1).sum())} of {len(fresh)} fresh roads {name} is beyond its limit at "
+                    f"On {int(outside.any(axis=1).sum())} of {len(values)} fresh roads {entry} is beyond its limit at "
                     f"{places}, up to {furthest:.4g}."
                 )
     by_point: dict[str, None] = {}
@@ -274,16 +283,38 @@ def _with_designs_between(
     allowed &= np.all(margins(limit_ends(limits), of_new) >= 0.0, axis=0)
     designs = np.concatenate([designs, new[allowed]])
     numbers = {name: np.concatenate([values, of_new[name][allowed]]) for name, values in numbers.items()}
+    return _best_of(names, designs, numbers)
+
+
+def _best_of(
+    names: Sequence[str], designs: np.ndarray, numbers: Mapping[str, np.ndarray]
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """The designs that no other one beats, in the order of the first objective."""
     objectives = np.stack([numbers[name] for name in names], axis=1)
     best = np.flatnonzero(non_dominated(objectives))
     best = best[np.lexsort(objectives[best].T[::-1])]
     return designs[best], {name: values[best] for name, values in numbers.items()}
 
 
+def _by_true_risk(
+    task: DesignTask[AbstractVehicle],
+    designs: np.ndarray,
+    numbers: Mapping[str, np.ndarray],
+    ride: Ride | ScenarioRide | None = None,
+) -> dict[str, np.ndarray]:
+    """The numbers with metrics joined by the true risk where the search joins them by a smooth one."""
+    measured = task.measured if ride is None else task.measured.by(ride)
+    if not smooth_in_scenarios(measured.ride):
+        return dict(numbers)
+    cars = [task.space.free.build(jnp.asarray(one, task.space.free.values.dtype)) for one in designs]
+    each = [measured.reported(measured.each(car)) for car in cars]
+    return {**numbers, **{name: np.array([one[name] for one in each]) for name in task.units}}
+
+
 def _on_fresh_roads(
     evaluator: Evaluator, designs: np.ndarray, count: int
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """The metrics of designs on other realisations of the road, shape (roads, points), and of the start, (roads,).
+    """The numbers of designs on other realisations of the road, shape (roads, points), and of the start, (roads,).
 
     Nothing of a road that has no other realisation.
     """
@@ -291,5 +322,6 @@ def _on_fresh_roads(
     rides = [ride_on(task.vehicle, road, task.objective, task.run) for road in other_roads(task.road, range(count))]
     both = np.vstack([designs, task.space.start])
     runs = [dict(zip(task.names, evaluator.program.values(both, ride).T, strict=True)) for ride in rides]
-    values = {name: np.stack([run[name] for run in runs]) for name in task.units if runs}
+    runs = [_by_true_risk(task, both, run, ride) for run, ride in zip(runs, rides, strict=True)]
+    values = {name: np.stack([run[name] for run in runs]) for name in task.names if runs}
     return {name: rows[:, :-1] for name, rows in values.items()}, {name: rows[:, -1] for name, rows in values.items()}

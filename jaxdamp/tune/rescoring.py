@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias, Unpack, final
 
 import numpy as np
@@ -19,12 +19,12 @@ from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride, simulate
-from jaxdamp.tune.limits import LimitRange
+from jaxdamp.tune.fresh_limits import decided, half_interval
+from jaxdamp.tune.limits import LimitRange, in_scenarios
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.scenario_ride import exact
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import RUN, Run
-from jaxdamp.tune.verdict import decided, half_interval
 from jaxdamp.vehicles import AbstractVehicle, frequency_response, linearise
 
 
@@ -85,7 +85,8 @@ class Rescore(AbstractResult):
     """The ride metrics of a vehicle before and after its tuning, on each of several roads.
 
     Attributes:
-        before: all ride metrics of the start, one number for each road.
+        before: all ride metrics of the start, one number for each road; of a tuning in scenarios also each limited one
+            in every scenario.
         after: the same of the tuned vehicle.
         units: unit of each metric.
         metric: name of the metric that was minimised.
@@ -104,8 +105,7 @@ class Rescore(AbstractResult):
     def change(self, name: str) -> Float[np.ndarray, " roads"]:
         """Change of a metric on each road, relative to its size before, positive if it rises; NaN where it was zero."""
         before, after = self.before[name], self.after[name]
-        ratio = np.divide(after, before, out=np.full(len(before), np.nan), where=before != 0.0)
-        return np.sign(before) * (ratio - 1.0)
+        return np.divide(after - before, np.abs(before), out=np.full(len(before), np.nan), where=before != 0.0)
 
     def and_on(self, other: "Rescore") -> "Rescore":
         """The same vehicles on these roads and on those of another rescoring."""
@@ -149,8 +149,8 @@ class Rescore(AbstractResult):
         Metrics that are zero or negative on a road are left out, since they have no change in percent.
         """
         rows = []
-        for name, before in self.before.items():
-            if np.all(before > 0):
+        for name in self.units:
+            if np.all((before := self.before[name]) > 0):
                 change, means = 100 * self.change(name), (float(before.mean()), float(self.after[name].mean()))
                 ends = (float(change.min()), float(change.max()))
                 rows.append(Compared(name, self.units[name], means, float(change.mean()), ends))
@@ -163,8 +163,8 @@ class Rescore(AbstractResult):
     def content(self) -> Contents:
         """All metrics on each road with units, ready for JSON; numbers that are not finite are None."""
         metrics = {
-            name: {"before": plain(before), "after": plain(self.after[name]), "unit": self.units[name]}
-            for name, before in self.before.items()
+            name: {"before": plain(self.before[name]), "after": plain(self.after[name]), "unit": unit}
+            for name, unit in self.units.items()
         }
         return {"metric": self.metric, "roads": self.roads, "metrics": metrics}
 
@@ -224,25 +224,33 @@ def driver(
     metrics: Sequence[Metric],
     objective: Objective | None,
     run: Run,
+    limited: Sequence[str] = (),
 ) -> Driver:
-    """The metrics of two vehicles on a road or in scenarios."""
+    """The metrics of two vehicles on a road or in scenarios, of limited ones also the value in each of these."""
 
     def drive(car: AbstractVehicle, road: Road | Scenarios) -> Mapping[str, Scalar]:
         if isinstance(road, Scenarios):
             ride = road.ride(car, metrics=metrics, **run)
             each = objective.of_each(ride.each()) if objective else ride.each()
             risk = exact(ride.risk)
-            return {name: risk(values, ride.weights) for name, values in each.items()}
+            own = {one: each[name][i] for name in limited for i, one in enumerate(in_scenarios(name, ride.names))}
+            return {name: risk(values, ride.weights) for name, values in each.items()} | own
         values = Ride(car, road, metrics=metrics, **run)()
         return objective.of(values) if objective else values
 
     return lambda road: [drive(car, road) for car in cars]
 
 
-def rescored(drive: Driver, roads: Sequence[Road | Scenarios], units: dict[str, str], metric: str) -> Rescore:
-    """The metrics of the vehicle before and after on roads or in scenarios."""
-    runs = [drive(road) for road in roads]
-    before, after = ({name: np.array([float(pair[side][name]) for pair in runs]) for name in units} for side in (0, 1))
+def rescored(
+    drive: Driver,
+    roads: Sequence[Road | Scenarios],
+    units: dict[str, str],
+    metric: str,
+    limited: Iterable[str] = (),
+) -> Rescore:
+    """The metrics of the vehicle before and after on roads or in scenarios, with the values that are limited."""
+    runs, names = [drive(road) for road in roads], dict.fromkeys([*units, *limited])
+    before, after = ({name: np.array([float(pair[side][name]) for pair in runs]) for name in names} for side in (0, 1))
     return Rescore(before, after, units, metric)
 
 
@@ -262,7 +270,7 @@ def on_fresh_roads(
         inputs: what they depend on beside the road.
         road: of the tuning.
         numbers: of the realisations.
-        allowed: the range of each limited metric.
+        allowed: the range of each limited metric, in every scenario.
         units: of the metrics.
         metric: that was minimised.
 
@@ -274,8 +282,8 @@ def on_fresh_roads(
         part = others[first:last]
         if not part:
             break
-        what = ("fresh roads", *inputs, part, metric, units)
-        new = piece(what, lambda part=part: rescored(drive, part, units, metric))
+        what = ("fresh roads", *inputs, part, metric, units, list(allowed))
+        new = piece(what, lambda part=part: rescored(drive, part, units, metric, allowed))
         driven = new if driven is None else driven.and_on(new)
         if decided(driven, allowed):
             break

@@ -160,7 +160,8 @@ class TuneResult(AbstractResult, Generic[V]):
     def ending(self) -> str:
         """The change on the road of the tuning, bounds and limits with their price, and extreme scenarios, in words."""
         before, after, unit = self.before[self.metric], self.after[self.metric], self.units[self.metric]
-        share = f" ({100 * (after / before - 1):+.1f} %)" if before else ""
+        change = percent_change(before, after)
+        share = "" if change is None else f" ({change:+.1f} %)"
         stops = [f"{name} {at_limit(self, name)}" for name in self.active_limits]
         at_bounds = [f"{change.name} {change.note}" for change in self.parameters if change.note]
         inside = "" if at_bounds else "all parameters inside their bounds"
@@ -173,7 +174,7 @@ class TuneResult(AbstractResult, Generic[V]):
         else:
             state = "an optimum" if self.converged else "not an optimum"
             parts = [f"{state} after {len(self.history)} steps", *stops, *[inside] * bool(inside)]
-        text = f"{self.metric} {before:.4g} -> {after:.4g} {unit}{share}: {', '.join(parts)}."
+        text = f"{self.metric} {before:.4g} -> {after:.4g}{unit and ' '}{unit}{share}: {', '.join(parts)}."
         return " ".join(filter(None, (f"{text}{self._extremes}", self.relaxation)))
 
     @property

@@ -11,13 +11,13 @@ from jaxdamp._field_types import check_module
 from jaxdamp._settings import part, with_defaults
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric
-from jaxdamp.parameters import match_paths
+from jaxdamp.parameters import free_parameters, match_paths
 from jaxdamp.tune.minimising import minimise
 from jaxdamp.tune.objective import Function
 from jaxdamp.tune.result import ToleranceEffect, TuneResult, V
 from jaxdamp.tune.scenario_ride import Risk
 from jaxdamp.tune.scenarios import Road, Scenarios
-from jaxdamp.tune.sensitivities import sensitivity
+from jaxdamp.tune.sensitivities import SensitivitySettings, sensitivity
 from jaxdamp.tune.settings import DEFAULTS, RUN, Run, Settings
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -64,10 +64,13 @@ def robust(
     scenarios = scenarios if risk is None else scenarios.with_risk(risk)
     if scatter is not None:
         check_scatter(scatter)
+        free_parameters(vehicle, over=list(scatter))  # unknown names are refused before the search
     tuning = minimise(metric, vehicle, scenarios, progress=progress, **settings)
     if not scatter:
         return tuning
-    effects = tolerance_effects(metric, tuning.vehicle, scenarios, scatter, **part(settings, RUN))
+    effects = tolerance_effects(
+        metric, tuning.vehicle, scenarios, scatter, metrics=settings["metrics"], **part(settings, RUN)
+    )
     return dataclasses.replace(tuning, tolerances=effects)
 
 
@@ -78,6 +81,8 @@ def tolerance_effects(
     vehicle: AbstractVehicle,
     road: Road | Scenarios,
     scatter: Mapping[str, float],
+    *,
+    metrics: Sequence[str | Metric] = (),
     **run: Unpack[Run],
 ) -> tuple[ToleranceEffect, ...]:
     """The effect of the scatter of each parameter on a metric, from its first and second derivatives.
@@ -90,6 +95,7 @@ def tolerance_effects(
         vehicle: with all parameters at their nominal values.
         road: as in `sensitivity`.
         scatter: standard deviation of each parameter relative to its value, by path, last part or pattern.
+        metrics: further metrics, which a function can use by name.
         run: `duration`, `dt` and `engine`, as in `simulate` (see `Run`).
 
     Raises:
@@ -105,7 +111,8 @@ def tolerance_effects(
     if isinstance(metric, Sequence) and not isinstance(metric, str):
         remedy = "Call it once for each metric."
         _checks.refuse("metric", "be a single one", _checks.described(metric), remedy)
-    result = sensitivity(metric, vehicle, road, over=list(scatter), dampers=None, second_order=True, **run)
+    of_scatter: SensitivitySettings = {"over": list(scatter), "dampers": None, "metrics": metrics, **run}
+    result = sensitivity(metric, vehicle, road, second_order=True, **of_scatter)
     ((name, value),) = result.values.items()
     assert result.hessian is not None
     paths = [parameter.partition("[")[0] for parameter in result.parameters]

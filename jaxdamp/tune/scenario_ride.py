@@ -56,6 +56,11 @@ def exact(risk: Risk) -> Risk:
     return (lambda values, weights: largest(values)) if risk is worst else risk
 
 
+def smooth_in_scenarios(ride: "Ride | ScenarioRide") -> bool:
+    """Whether a ride joins the metrics of scenarios by a smooth risk, which is not the printed one."""
+    return isinstance(ride, ScenarioRide) and exact(ride.risk) is not ride.risk
+
+
 @final
 @dataclasses.dataclass(frozen=True)
 class CVaR:

@@ -35,7 +35,7 @@ from jaxdamp.parameters import (
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride
 from jaxdamp.tune.measuring import Measurement
-from jaxdamp.tune.objective import Function, Objective, objective_of
+from jaxdamp.tune.objective import Function, Objective, goal_objective, objective_of
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.sensitivity_result import CurveSensitivity, Sensitivity
 from jaxdamp.tune.settings import RUN, Free, Run
@@ -60,11 +60,13 @@ class Curves(TypedDict, total=False):
 
 
 class SensitivitySettings(Free, Curves, Run, total=False):
-    """All keywords of `sensitivity`: those of `Free`, `Curves` and `Run`."""
+    """All keywords of `sensitivity`: those of `Free`, `Curves` and `Run`, and further metrics."""
+
+    metrics: Sequence[str | Metric]
 
 
 DEFAULTS: SensitivitySettings = {
-    "over": ("*",), "freeze": (), "dampers": "*damper", "reach": None, "hats": HATS, **RUN
+    "over": ("*",), "freeze": (), "dampers": "*damper", "reach": None, "hats": HATS, "metrics": (), **RUN
 }  # fmt: skip
 
 
@@ -86,8 +88,8 @@ def sensitivity(
     from.
 
     Arguments:
-        metric: one ride metric or several, by name or as a `metrics.Metric`; or a function of metrics, as in
-            `minimise`.
+        metric: one ride metric or several, by name, "comfort", "travel" or "grip", or as a `metrics.Metric`; or a
+            function of metrics, as in `minimise`.
         vehicle: where the derivatives are taken.
         road: a road, `roads.white(...)`, or `Scenarios`, whose metrics are joined by their risk; with `quantities` a
             function of these that makes a road: `lambda speed: roads.iso8608("C", speed, seed=1)`.
@@ -96,8 +98,8 @@ def sensitivity(
         settings: keywords, all optional: `over`, all parameters if left out, and `freeze`, as in `minimise`;
             `dampers`, the laws whose curves are looked at, by path or pattern, None for none, as on a white road;
             `reach`, the largest velocity of the curves [m/s], three times the largest RMS of a damper velocity if left
-            out; `hats`, the number of velocities on each side, 12 if left out; `duration`, `dt` and `engine` (see
-            `Run`).
+            out; `hats`, the number of velocities on each side, 12 if left out; `metrics`, further ones that a
+            function can use by name; `duration`, `dt` and `engine` (see `Run`).
 
     Raises:
         ValueError: unknown metrics, parameters or dampers; metrics without derivative; quantities of a road that is no
@@ -113,7 +115,7 @@ def sensitivity(
     given = dict(quantities or {})
     _check(wanted, vehicle, road, given)
     first, run = (road if isinstance(road, GIVEN) else road(**given)), part(settings, RUN)
-    objective = _objective(wanted, vehicle, white=is_white(first))
+    objective = _objective(wanted, vehicle, settings["metrics"], white=is_white(first))
     hatted, paths = _with_curves(vehicle, first, settings, run)
     of_vehicle, free = _free(vehicle, hatted, settings["over"], settings["freeze"])
     point = np.array([*np.asarray(free.values, float), *given.values()])
@@ -137,9 +139,13 @@ def sensitivity(
     )
 
 
-def _objective(wanted: Sequence[str | Metric | Function], vehicle: AbstractVehicle, *, white: bool) -> Objective:
+def _objective(
+    wanted: Sequence[str | Metric | Function], vehicle: AbstractVehicle, more: Sequence[str | Metric], *, white: bool
+) -> Objective:
     """The metrics that are wanted, and no others; of a function all that it may use."""
-    objective = objective_of(wanted, vehicle, [], [], white=white)
+    further = [one.name for one in more if isinstance(one, Metric)]
+    wanted = [one if one in further else goal_objective(one, vehicle, white=white) for one in wanted]
+    objective = objective_of(wanted, vehicle, more, [], white=white)
     if objective.functions:
         return objective
     return objective._replace(metrics=tuple(m for m in objective.metrics if m.name in objective.names))

@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from jaxtyping import Float
 
 from jaxdamp._status import Status
 from jaxdamp._tables import typeset_unit
 from jaxdamp.metrics import Metric
 from jaxdamp.solve import Evaluation
 from jaxdamp.tune.changes import change_in_percent, mean_change, signed_metrics
+from jaxdamp.tune.fresh_limits import WITHIN, excess, in_each, lost_limits
 from jaxdamp.tune.limits import Limit, LimitRange
 from jaxdamp.tune.objective import Objective, exact_counterpart
 from jaxdamp.tune.ranges import FACTOR, Change, SearchRange
@@ -21,11 +21,9 @@ from jaxdamp.vehicles import AbstractVehicle, ChannelKind
 
 if TYPE_CHECKING:
     from jaxdamp.tune.descending import Ended
-    from jaxdamp.tune.rescoring import Rescore
     from jaxdamp.tune.result import Attempt, TuneResult
 
 
-WITHIN = 0.01  # relative excess over a limit on fresh roads up to which it counts as met
 PRICED = (  # kinds of channels whose rise is a price: of body, travel and tyres, not the speed and power of the damper
     ChannelKind.HEIGHT, ChannelKind.ANGLE, ChannelKind.ACCELERATION, ChannelKind.ANGULAR_ACCELERATION,
     ChannelKind.STROKE, ChannelKind.TYRE_LOAD, ChannelKind.RELATIVE_TYRE_LOAD,
@@ -69,7 +67,7 @@ def verdict_of(result: "TuneResult[AbstractVehicle]") -> Verdict:
     cost = f"; price: {name} {price:+.1f} %" if name else "; nothing else gets worse"
     held = _limits_in_words(result)
     error = 0.0 if result.fresh is None else 100.0 * result.fresh.half_width(result.metric)
-    over = lost_limits(result.fresh, result.allowed)
+    over = lost_limits(result.fresh, _allowed(result))
     lost = [f"{name} is {100 * x:.1f} % beyond its limit" for name, x in over.items()]
     if lost:
         outcome, first, held = Outcome.LIMIT_LOST, f"Not better: {'; '.join(lost)}; {words}", ""
@@ -84,6 +82,12 @@ def verdict_of(result: "TuneResult[AbstractVehicle]") -> Verdict:
     else:
         outcome, first = Outcome.BETTER, f"Better: {words}"
     return Verdict(outcome, f"{first}{cost}{held}.")
+
+
+def _allowed(result: "TuneResult[AbstractVehicle]", name: str = "") -> dict[str, LimitRange]:
+    """The range of each limited metric, or of one of them, in every scenario."""
+    allowed = {one: span for one, span in result.allowed.items() if name in ("", one)}
+    return in_each(allowed, result.scenarios.names if result.scenarios else ())
 
 
 def _change(result: "TuneResult[AbstractVehicle]") -> tuple[float, str]:
@@ -144,53 +148,12 @@ def _limits_in_words(result: "TuneResult[AbstractVehicle]") -> str:
         after, change = result.after[name], mean_change(result, name)
         share = f"{after:.4g} {typeset_unit(result.units[name])}".rstrip() if change is None else f"{change:+.1f} %"
         text = f"{name} {share}{', ' * (name in result.active_limits)}{at_limit(result, name)}"
-        if result.fresh is not None and name in result.allowed:
-            beyond = int(np.sum(excess(result.fresh, name, result.allowed[name]) > WITHIN))
-            text += f", beyond it on {beyond} of {result.fresh.roads} fresh roads" * bool(beyond)
+        if (fresh := result.fresh) is not None and name in result.allowed:
+            over = [excess(fresh, one, span) for one, span in _allowed(result, name).items()]
+            beyond = int(np.sum(np.max(over, axis=0) > WITHIN))
+            text += f", beyond it on {beyond} of {fresh.roads} fresh roads" * bool(beyond)
         texts.append(text)
     return f"; limits: {'; '.join(texts)}" if texts else ""
-
-
-def lost_limits(fresh: "Rescore | None", allowed: Mapping[str, LimitRange]) -> dict[str, float]:
-    """The mean excess over limits that are broken on average over fresh roads, by more than the error of this mean."""
-    if fresh is None or fresh.roads < 2:
-        return {}
-    over = {name: excess(fresh, name, limit) for name, limit in allowed.items()}
-    return {name: float(np.mean(x)) for name, x in over.items() if np.mean(x) - half_interval(x) > WITHIN}
-
-
-def excess(fresh: "Rescore", name: str, allowed: LimitRange) -> Float[np.ndarray, " roads"]:
-    """Excess over a limit on each fresh road, relative to it, negative inside."""
-    over = []
-    for before, after in zip(fresh.before[name], fresh.after[name], strict=True):
-        lower, upper = allowed.at(float(before))
-        size = max(abs(end) for end in (lower, upper) if np.isfinite(end)) or 1.0
-        over.append(max(after - upper, lower - after) / size)
-    return np.array(over)
-
-
-def half_interval(values: Float[np.ndarray, " roads"], level: float = 0.95) -> float:
-    """Half the interval of the mean of independent values, by Student's distribution; infinite for one value.
-
-    Arguments:
-        values: one for each road.
-        level: of the interval.
-    """
-    from scipy.special import stdtrit
-
-    if len(values) < 2:
-        return np.inf
-    return float(stdtrit(len(values) - 1, 0.5 + 0.5 * level) * np.std(values, ddof=1) / np.sqrt(len(values)))
-
-
-def decided(fresh: "Rescore", allowed: Mapping[str, LimitRange]) -> bool:
-    """Whether further roads would change nothing: the sign of the gain and every limit are certain, or the error small.
-
-    It is asked again as roads are added, hence at 99 %.
-    """
-    offsets = [fresh.change(fresh.metric), *(excess(fresh, name, limit) - WITHIN for name, limit in allowed.items())]
-    halves = [half_interval(offset, 0.99) for offset in offsets]
-    return all(abs(np.mean(offset)) > half or half < WITHIN for offset, half in zip(offsets, halves, strict=True))
 
 
 _ROUNDING = 1e-12  # of a metric, by which its derivative times the parameter counts as zero

@@ -9,6 +9,7 @@ from jaxtyping import Array, Float
 from jaxdamp._field_types import check_module
 from jaxdamp._limits import root
 from jaxdamp._quickly import compiled_quickly
+from jaxdamp._traced import behind
 from jaxdamp._types import Scalar
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.frame import STANDARD_GRAVITY, Frame
@@ -83,6 +84,9 @@ def _stiffness(ports: Ports, deflection: Float[Array, " ports"]) -> Float[Array,
 
 def _lower_end(link: Link, on_road: set[str]) -> str:
     """The height of the body at the lower end of a link from a body without wheels; empty of other links."""
-    shares = {name: float(share) for name, share in link.extension.terms.items() if name[:2] == "z_"}
+    heights = {name: share for name, share in link.extension.terms.items() if name[:2] == "z_"}
+    if on_road.issuperset(heights):  # an anti-roll bar, whose shares may be traced
+        return ""
+    shares = {name: float(share if (known := behind(share)) is None else known) for name, share in heights.items()}
     above, below = ([name for name, share in shares.items() if share * side > 0.0] for side in (1.0, -1.0))
     return below[0] if len(above) == len(below) == 1 and above[0] not in on_road else ""

@@ -130,7 +130,8 @@ class TrackedHull(AbstractVehicle):
         μ = √2 ln d/Σ_d l² · √(J C Σ l²/(4π² + ln² d)); the paper's 1.41 is √2, and its sums run over the damped wheels
         in front of the root and over all under it.
         """
-        _checks.positive("decrement", decrement)
+        if (known := _checks.concrete(decrement)) is not None and not np.all(known > 1.0):
+            _checks.refuse("decrement", "be above 1", decrement, "It is an amplitude divided by that a cycle later.")
         every, front, rear = self._squares()
         logarithm = jnp.log(jnp.asarray(decrement, dtype=every.dtype))
         root = jnp.sqrt(self.pitch_inertia * self.wheel_rate * every / (4.0 * jnp.pi**2 + logarithm**2))
@@ -153,7 +154,7 @@ class TrackedHull(AbstractVehicle):
         """Decay of free pitch without heave with these coefficients [N s/m], by half cycles and over a whole one.
 
         Each half cycle, from one turning point to the next, decays by exp(πn/√(ω² − n²)) with n of its direction; the
-        whole cycle by their product. Valid below critical damping, n < ω.
+        whole cycle by their product. Valid below critical damping, n < ω; other coefficients are refused.
 
         A hull that is free to heave decays a little differently, as its dampers, on wheels 1, 2 and 5, also lift it.
         From 0.02 rad, `simulate(hull, flat_road, start={"pitch": 0.02})` gives for `m113_003` 14.05, 15.09 and 17.14
@@ -170,6 +171,12 @@ class TrackedHull(AbstractVehicle):
 
         def half(ahead: ScalarLike, behind: ScalarLike) -> Scalar:
             n = (ahead * front + behind * rear) / self.pitch_inertia
+            known = _checks.concrete(n / frequency)
+            if known is not None and not np.all(known < 1.0):
+                remedy = "Pitch does not oscillate: simulate it, or take smaller ones."
+                _checks.refuse(
+                    "compression, rebound", "be below critical damping", f"{np.max(known):.3g} times it", remedy
+                )
             return jnp.exp(jnp.pi * n / jnp.sqrt(frequency**2 - n**2))
 
         down, up = half(compression, rebound), half(rebound, compression)

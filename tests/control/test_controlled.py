@@ -239,6 +239,16 @@ def test_the_error_of_a_coarse_step_is_estimated_without_the_controller():
         Ride(Controlled(half, Skyhook()), roads.iso8608("C", speed=20.0, seed=1), duration=2.0, dt=5e-3)
 
 
+def test_a_wheel_that_lifts_on_a_commanded_damper_never_pulls():
+    """Lift-off computes the force of the damper a second time, which must be that of the same command."""
+    law = Scheduled((Linear(5e3), Linear(3e4)), levels=[0.0, 1.0], command=1.0)
+    hull = Controlled(vehicles.presets.m113_003(law, tyre_lifts=True), Skyhook(gain=1e4))
+    response = simulate(hull, roads.iso8608("E", speed=8.0, seed=1), duration=1.0, dt=1e-3)
+    load, command = (np.asarray(response[f"wheel_1_{name}"]) for name in ("relative_tyre_load", "damper_command"))
+    assert 0.0 < np.max(command[load < -0.999]) < 0.5  # in the air, not at the command of the law itself
+    assert np.min(load) == pytest.approx(-1.0, abs=1e-9)
+
+
 def test_single_precision_drives_too(car):
     with jax.enable_x64(False):
         single = Controlled(quarter(Scheduled((Linear(300.0), Linear(3900.0)), [0.0, 1.0], 0.25)), Groundhook())

@@ -3,7 +3,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxdamp.metrics import dynamic_load_coefficient, lift_off_fraction, road_stress_factor
+from jaxdamp.metrics import STATISTICS, dynamic_load_coefficient, lift_off_fraction, road_stress_factor
 
 
 VARIATION = 900.0 * np.sin(2 * np.pi * np.arange(128) / 128)
@@ -43,6 +43,13 @@ def test_lift_off_counts_samples():
     assert float(lift_off_fraction(load, 3.0)) == pytest.approx(0.6)
     assert float(lift_off_fraction(load - 1000.0)) == 1.0
     assert float(lift_off_fraction(load + 1000.0)) == 0.0
+
+
+@pytest.mark.parametrize("precision", [np.float32, np.float64])
+def test_a_wheel_in_the_air_counts_as_lifted_also_with_the_rounding_of_its_load(precision):
+    rounded = -1.0 + np.finfo(precision).eps * np.array([0.0, 1.0, -1.0, 2.0, -2.0])
+    load = jnp.asarray(np.append(rounded, [-0.999, -0.5, 0.0]), precision)
+    assert float(STATISTICS["lift_off_fraction"].of(load, 1e-3)) == pytest.approx(5 / 8)
 
 
 def test_lift_off_has_no_gradient():

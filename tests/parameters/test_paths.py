@@ -115,6 +115,7 @@ def test_replace():
         ),
         ({"friction_force": np.nan}, r"`CoulombFriction\.friction_force` must be finite, but is nan"),
         ({"knots": [0.2, 0.1]}, r"`PiecewiseLinear\.knots` must be strictly increasing"),
+        ({"lag_time": 0.1, "*_time": 0.2}, "'lag_time' and '\\*_time', which both name lag_time"),
     ],
 )
 def test_replace_refuses(values, message):

@@ -10,6 +10,9 @@ import pytest
 
 from jaxdamp import Ride, dampers, parameters, roads, sweep, tune, vehicles
 from jaxdamp.metrics import Metric
+from jaxdamp.tune import rescoring
+from jaxdamp.tune.fresh_limits import in_each, lost_limits
+from jaxdamp.tune.limits import limit_ranges
 
 
 LAW = dampers.TemperatureScaled(dampers.Bilinear(2500.0, 1500.0), temperature=293.15)
@@ -17,6 +20,7 @@ CAR = vehicles.presets.quarter_car_000(LAW)
 ACCELERATION, TYRE = "rms_sprung_acceleration", "dynamic_load_coefficient"
 DRIVEN = {"C": roads.iso8608("C", 20.0, seed=1), "bump": roads.cosine_bump(0.05, start=0.1, duration=0.2)}
 HOT = tune.Condition({"temperature": 350.0, "sprung_mass": 1500.0}, {"damper.**_rate": 0.8}, weight=3.0)
+AS_IT_IS = tune.Condition()
 WHITE = {"C": roads.white("C", 20.0), "D": roads.white("D", 10.0)}
 LINEAR = vehicles.presets.quarter_car_000()
 WILD = vehicles.presets.quarter_car_000(dampers.Polynomial([0.0, 2000.0, 0.0, -5000.0]))
@@ -79,6 +83,37 @@ def test_limits_hold_in_every_scenario() -> None:
     assert np.max(result.scenarios.after[ACCELERATION]) == pytest.approx(1.204, rel=1e-5)
     (held,) = result.active
     assert held == "rms_sprung_acceleration ≤ 1.204 m/s², in 'D, empty'"
+
+
+def test_a_limit_in_scenarios_is_judged_in_each_of_them_on_fresh_roads() -> None:
+    """A scenario that keeps its limit easily does not make up for one that does not."""
+    scenarios = tune.Scenarios([DRIVEN["C"]], {"light": tune.Condition({"sprung_mass": 800.0}), "as it is": AS_IT_IS})
+    metrics = [m for m in LINEAR.ride_metrics if m.name in (ACCELERATION, TYRE)]
+    drive = rescoring.driver((LINEAR, LINEAR), metrics, None, {"duration": 0.3}, [ACCELERATION])
+    each = scenarios.ride(LINEAR, metrics=metrics, duration=0.3).each()[ACCELERATION]
+    ranges = limit_ranges({ACCELERATION: 0.5 * float(each[0] + each[1])}, [ACCELERATION])
+    allowed = in_each(ranges, ["road 1, light", "road 1, as it is"])
+    units = {m.name: "" for m in metrics}
+    fresh = rescoring.rescored(drive, [scenarios] * 3, units, TYRE, allowed)
+    np.testing.assert_allclose([fresh.after[name] for name in allowed], np.tile(each, (3, 1)).T, rtol=1e-12)
+    assert list(lost_limits(fresh, allowed)) == [f"{ACCELERATION} in 'road 1, light'"]
+    assert set(fresh.content()["metrics"]) == set(units)
+
+
+def test_the_numbers_of_the_worst_case_are_the_true_ones() -> None:
+    """Of eight equal roads the smooth maximum of the search is 2 % above the largest value."""
+    scenarios = tune.Scenarios([WHITE["C"]] * 8, risk="worst")
+    limits, over = {"rms_dynamic_tyre_load": "-5%"}, ["damper.rate"]
+    result = tune.minimise(ACCELERATION, LINEAR, scenarios, limits=limits, over=over)
+    alone = Ride(LINEAR, WHITE["C"])()
+    load = float(alone["rms_dynamic_tyre_load"])
+    assert result.before["rms_dynamic_tyre_load"] == pytest.approx(load, rel=1e-9)
+    assert result.limits == {"rms_dynamic_tyre_load": pytest.approx(0.95 * load, rel=1e-9)}
+    front = tune.pareto([ACCELERATION, "rms_dynamic_tyre_load"], LINEAR, scenarios, points=3, limits=limits, over=over)
+    assert front.before[ACCELERATION] == pytest.approx(float(alone[ACCELERATION]), rel=1e-9)
+    assert front.limits == result.limits
+    first = float(Ride(front.point(0), WHITE["C"])()[ACCELERATION])
+    assert front.values[ACCELERATION][0] == pytest.approx(first, rel=1e-9)
 
 
 def test_tolerances_and_samples_are_conditions() -> None:

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from jaxdamp import Ride, bench, dampers, identify, parameters, plots, roads, tune, vehicles
+from jaxdamp.metrics import Metric
+from jaxdamp.tune import robust_tuning
 from jaxdamp.tune.sensitivities import ForceHats, sensitivity, with_hats
 
 
@@ -132,6 +134,25 @@ def test_tolerances_cost_what_a_sample_says() -> None:
 
 
 @pytest.mark.exhaustive
+def test_the_cost_of_scatter_is_said_of_every_objective_of_a_tuning() -> None:
+    """Short names, and functions of further metrics."""
+    scenarios = tune.Scenarios([roads.white("C", 20.0)])
+    weighted = Metric("sprung_acceleration", "rms", "Wd")
+    by_name = tune.robust("comfort", LINEAR, scenarios, scatter={"damper.rate": 0.1})
+    named = tune.robust("weighted_rms_sprung_acceleration", LINEAR, scenarios, scatter={"damper.rate": 0.1})
+    assert by_name.tolerances == named.tolerances
+    further = tune.robust(
+        lambda m: m[weighted.name], LINEAR, scenarios, metrics=[weighted], scatter={"damper.rate": 0.1}
+    )
+    assert further.tolerances[0].deviation > 0.0 and further.tolerances != named.tolerances
+
+
+def test_unknown_scatter_is_refused_before_the_search(monkeypatch) -> None:
+    monkeypatch.setattr(robust_tuning, "minimise", None)
+    with pytest.raises(ValueError, match="No parameter is named 'rat': did you mean 'rate'"):
+        tune.robust("comfort", LINEAR, tune.Scenarios([roads.white("C", 20.0)]), scatter={"rat": 0.1})
+
+
 def test_a_robust_tuning_meets_the_worst_case_better() -> None:
     """Two payloads want different rates; the tuning for the worst case has the smaller largest value."""
     loads = {"empty": tune.Condition(), "laden": tune.Condition({"sprung_mass": 1800.0})}

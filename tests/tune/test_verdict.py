@@ -11,9 +11,9 @@ import pytest
 from jaxdamp import dampers, roads, tune
 from jaxdamp.solve import SequentialQuadratic
 from jaxdamp.tune import Outcome, Rescore, Status, TuneResult, minimising
+from jaxdamp.tune.fresh_limits import decided, half_interval
 from jaxdamp.tune.limits import Limit, limit_ranges
 from jaxdamp.tune.ranges import Change
-from jaxdamp.tune.verdict import decided, half_interval
 from jaxdamp.vehicles import presets
 
 
@@ -80,6 +80,14 @@ def test_metrics_that_may_be_negative_have_no_percent():
     words |= dict(limits={}, allowed={}, fresh=fresh)
     lowered = TuneResult(CAR, CAR, MEAN, before=sides[0], after=sides[1], **words)
     assert lowered.verdict.sentence.startswith(f"Better: {MEAN} -0.02 -> -0.021 m on 3 fresh roads")
+
+
+def test_what_is_maximised_gets_better_as_its_negative_falls():
+    result = tune.minimise(lambda m: -m[COMFORT], CAR, WHITE, over={"damper.rate": (2000.0, 4000.0)})
+    assert result.parameters[0].after == pytest.approx(2000.0)
+    assert result.verdict.outcome in (Outcome.BETTER, Outcome.TRADE)
+    change = (result.before[COMFORT] - result.after[COMFORT]) / result.before[COMFORT]
+    assert f"objective {100.0 * change:+.1f} %" in result.verdict.sentence and change < 0.0
 
 
 def test_outside_its_records_a_damper_is_not_called_better():

@@ -69,6 +69,7 @@ CASES = [
     (lambda: pareto(points=5.5), "points", "5.5", "Write `points=1`"),
     (lambda: pareto(reference=[1.0, 2.0]), "reference", "a list of 2", f"Write `{{'{COMFORT}': 1.5}}`"),
     (lambda: pareto(reference={COMFORT: "a"}), f"reference['{COMFORT}']", "the text 'a'", "be a number"),
+    (lambda: pareto(limits={TYRE: 1e3, "grip": 2e3}), "limits", f"'{TYRE}' and 'grip', which both limit", "the names"),
     (lambda: pareto(limits={TYRE: np.nan}), f"limits['{TYRE}']", "nan", "Write (-0.08, 0.1)"),
     (lambda: sensitivity(metric=[]), "metric", "a list of 0", "The call is"),
     (lambda: sensitivity(road=3), "road", "the number 3", "roads.iso8608"),

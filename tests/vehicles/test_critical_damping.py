@@ -1,10 +1,12 @@
 """Critical damping: against the damping ratio of a mass alone, and loads by hand."""
 
+import equinox as eqx
 import jax
 import numpy as np
 import pytest
 
 from jaxdamp import dampers
+from jaxdamp.parameters import replace
 from jaxdamp.vehicles import QuarterCar, critical_damping, modes
 from jaxdamp.vehicles.presets import full_car_jazar, half_car_002, m113_003, truck_001
 
@@ -41,3 +43,16 @@ def test_each_wheel_carries_its_share():
 def test_it_is_differentiable():
     slope = jax.jit(jax.grad(lambda k: critical_damping(QuarterCar(300.0, 40.0, k, 2e5, LAW))["damper"].body))(18e3)
     assert float(slope) == pytest.approx(np.sqrt(300.0 / 18e3), rel=1e-9)
+
+
+def test_it_is_differentiable_beside_an_anti_roll_bar():
+    car = full_car_jazar()
+
+    def body(car):
+        return critical_damping(car)["front_left_damper"].body
+
+    rate = car.front.corner.spring_rate
+    stiffer = replace(car, {"front.corner.spring_rate": 1.001 * rate})
+    slope = eqx.filter_jit(eqx.filter_grad(body))(car).front.corner.spring_rate
+    difference = (body(stiffer) - body(car)) / (1e-3 * rate)
+    assert float(slope) == pytest.approx(float(difference), rel=1e-3)

@@ -99,3 +99,11 @@ def test_refuses_what_cannot_be(change, message):
     values = {"sprung_mass": 5e3, "pitch_inertia": 1e4, "wheel_positions": [1.0, 0.0, -1.0], "wheel_rate": 1e5}
     with pytest.raises(ValueError, match=message):
         TrackedHull(**(values | {"damper": dampers.Linear(1e4), "damped": (1, 3)} | change))
+
+
+def test_formulas_outside_their_validity_are_refused():
+    hull = m113_003()
+    with pytest.raises(ValueError, match=r"`decrement` must be above 1, but is 0\.5"):
+        hull.required_damping(0.5)
+    with pytest.raises(ValueError, match=r"must be below critical damping, but is \d.* times it"):
+        hull.pitch_decay(1e5, 1e5)
