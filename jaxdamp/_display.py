@@ -43,7 +43,7 @@ _KEPT = re.compile(r"m/s(\^|²|\^2)|^m\^?[23²³]|m/km|cycle")  # accelerations,
 _EXPONENT = re.compile(r"(?<![\w.])\d(?:\.\d+)?e\+0[1-5]\b")  # two or three digits of a large number: 1.1e+03 is 1100
 _NUMBER = r"[-−+]?(?:\d+(?:\.\d+)?(?:e[-+]?\d+)?|inf)"
 _AMOUNT = re.compile(
-    rf"(?<![\w.])({_NUMBER})(?:( to | … | ± )({_NUMBER}))?([ \xa0])"
+    rf"(?<![\w.])((?:{_NUMBER}, )*)({_NUMBER})(?:( to | … | ± )({_NUMBER}))?([ \xa0])"
     r"(N s/m|N/mm|N/m|mm/s|m/s|mm|kN|kg|N|m|J)(?![\w²³^/·]| [ms]\b)"
 )
 _SIGNED = re.compile(
@@ -172,15 +172,18 @@ class Display:
 
     def _amount(self, found: re.Match[str]) -> str:
         """Numbers with their unit as they are shown; a value beside its error has the digits that the error leaves."""
-        shown = self.of(found[5])
-        texts = [text.replace("−", "-") for text in (found[1], found[3]) if text]
-        values = [shown(float(text)) for text in texts]
-        if found[2] == " ± ":
-            said = _plain(plus_minus(*values))
+        before, *pair, blank, unit = found.groups()
+        shown, sign = self.of(unit), pair[1]
+
+        def one(text: str) -> str:
+            return _plain(f"{shown(float(text.replace('−', '-'))):.{_figures(text)}g}")
+
+        if sign == " ± ":
+            said = _plain(plus_minus(*(shown(float(text.replace("−", "-"))) for text in (pair[0], pair[2]))))
         else:
-            pairs = zip(values, texts, strict=True)
-            said = (found[2] or "").join(_plain(f"{value:.{_figures(text)}g}") for value, text in pairs)
-        return f"{said}{found[4]}{shown.unit}"
+            said = (sign or "").join(one(text) for text in (pair[0], pair[2]) if text)
+        others = "".join(f"{one(text)}, " for text in before.split(", ")[:-1])
+        return f"{others}{said}{blank}{shown.unit}"
 
 
 def _plain(text: str) -> str:

@@ -121,7 +121,7 @@ class Table:
         cells = [
             _cell_shown(present, column, cell, unit, quantity) for column, cell in zip(self.columns, row, strict=True)
         ]
-        turned, signed = present.turned(tuple(by_name)), present.signed(quantity)
+        turned, signed = present.turned(tuple(c.name for c in self.columns)), present.signed(quantity)
         return tuple(cells[to if signed or self.columns[to].unit else at] for at, to in enumerate(turned))
 
     def texts(self) -> list[tuple[str, ...]]:

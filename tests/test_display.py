@@ -44,6 +44,16 @@ def test_a_table_is_shown_in_shop_units_and_its_plain_data_stay():
     assert table.records()[0]["value"] == 444.822
 
 
+@pytest.mark.parametrize("display", [Display("imperial"), Display(sign="compression-positive")])
+def test_columns_of_one_heading_keep_their_cells(display):
+    """Each parameter of a line of dampers has its ±."""
+    columns = (Column("damper"), Column("rate", "N s/m"), Column("±", "N s/m"), Column("force", "N"), Column("±", "N"))
+    table = Table("T", (*columns, Column("remark")), (("A", 100.0, 1.0, 200.0, 2.0, "unusual"),))
+    with shown_in(display):
+        rows = table.shown().rows
+    assert len(rows[0]) == 6 and rows[0][-1] == "unusual"
+
+
 def test_lowest_and_highest_change_places_with_the_sign():
     ends = Table("", (Column("run"), Column("least force", "N"), Column("largest force", "N")), (("a", -300.0, 700.0),))
     rows = (("velocity", "m/s", -0.5, 0.9), ("frequency", "Hz", 1.0, 5.0))
@@ -77,6 +87,8 @@ def test_large_numbers_in_sentences_are_written_out():
         ("known to 254 ± inf mm", "known to 10 ± inf in"),
         ("stroke noise 1e-05 m", "stroke noise 0.000394 in"),
         ("2.54 m, 4.54 kg and 11.3 J per cycle", "100 in, 10 lb and 100 in lbf per cycle"),
+        ("axles (0, 0.667, -1.33 m) and 5, 10 s", "axles (0, 26.3, -52.4 in) and 5, 10 s"),
+        ("at 1, 2 to 3 N", "at 0.225, 0.45 to 0.674 lbf"),
         ("3e16 ± 1e19 N/m³, 3 kg m^2, 3 N m, 2 N/s, 5 W", "3e16 ± 1e19 N/m³, 3 kg m^2, 3 N m, 2 N/s, 5 W"),
     ],
 )

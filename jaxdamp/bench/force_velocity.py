@@ -10,15 +10,26 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._files import FOLDER_SUFFIXES, find_files
 from jaxdamp._settings import with_defaults
-from jaxdamp._tables import Column as TableColumn, Table
+from jaxdamp._tables import Column as TableColumn, Contents, Table
 from jaxdamp._types import Figure
 from jaxdamp.bench import sign as signs
 from jaxdamp.bench.columns import Choice
+from jaxdamp.bench.manifest import BENCH_KEYS, TABLE_KEYS, Kinds, find_manifest, merged, read_manifest
 from jaxdamp.bench.raw import Problems
 from jaxdamp.bench.readers import FILES, READERS, Files, read_tables, with_own
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import BenchSet
-from jaxdamp.bench.table_points import SIDES, Curve, How, Points, curves_of, is_force_velocity, sides_of, with_headers
+from jaxdamp.bench.table_points import (
+    SIDES,
+    Curve,
+    How,
+    Points,
+    curves_of,
+    is_force_velocity,
+    sides_of,
+    stated_sign,
+    with_headers,
+)
 from jaxdamp.dampers import AbstractDamper, FittedRange, Scheduled, SplineTable, Table as TableLaw, with_fitted_range
 
 
@@ -155,6 +166,7 @@ def read_table(
     sign: str | None = None,
     side: str | None = None,
     columns: Mapping[str, str | int | None] | None = None,
+    manifest: str | os.PathLike[str] | bool = True,
     **files: Unpack[Files],
 ) -> ForceVelocityTable:
     r"""Read a force-velocity table: a manufacturer's sheet, or points at peak velocity.
@@ -172,6 +184,8 @@ def read_table(
         side: of a table with one direction only: "rebound" or "compression", of which another file holds the other, or
             "symmetric" if both are the same.
         columns: "velocity" and "force" to header or number (from 0) of the column.
+        manifest: a TOML file with `sign`, `columns`, `units` and `delimiter`, as in `read`; True takes `jaxdamp.toml`
+            of the folder that is read.
         files: `units`, `delimiter` and `readers`, all optional (see `Files`).
 
     Returns:
@@ -198,23 +212,28 @@ def read_table(
     """
     if side is not None:
         _checks.one_of("side", side, SIDES)
-    signs.check_words(sign, None)
-    how = How(Choice({**(columns or {})}, {**(files["units"] or {})}), sign, side)
+    given = {"sign": sign, "columns": columns, "units": files["units"], "delimiter": files["delimiter"]}
+    given, notes = _stated(paths, manifest, given, TABLE_KEYS)
+    signs.check_words(given["sign"], None)
+    choice = Choice({**(given["columns"] or {})}, {**(given["units"] or {})})
     sheets, readers = find_files(paths, {*FOLDER_SUFFIXES, *(files["readers"] or {})}), with_own(files["readers"])
-    sides, notes, problems = [], [], Problems()
+    sides, problems, how, stated = [], Problems(), How(choice, given["sign"], side), set()
     for file in sheets:
         with problems.collected():
-            tables = [with_headers(table) for table in read_tables(file, readers, files["delimiter"])]
+            tables = [with_headers(table) for table in read_tables(file, readers, given["delimiter"])]
             fitting = [table for table in tables if is_force_velocity(table, how.choice)]
             if not fitting:
                 there = ", ".join(name for table in tables for name in table.names)
                 what = "which has a velocity, forces and no time"
                 raise ValueError(f"{file} is no force-velocity table, {what}: its columns are {there}.")
             for table in fitting:
+                stated.add(stated_sign(table))
                 found, said = sides_of(table, how)
                 sides += found
                 notes += said
     problems.raise_any()
+    if how.sign is None and len(stated) == 1:
+        how = replace(how, sign=stated.pop())
     curves, said = curves_of(sides, how)
     return ForceVelocityTable(sheets[0].stem, curves, tuple(dict.fromkeys([*notes, *said])))
 
@@ -226,6 +245,7 @@ def are_tables(
     units: Mapping[str, str] | None = None,
     delimiter: str | None = None,
     sign: str | None = None,
+    manifest: str | os.PathLike[str] | bool = True,
 ) -> bool:
     """Whether files are force-velocity tables rather than records. Files too large for one, or unreadable, are none.
 
@@ -235,13 +255,29 @@ def are_tables(
         units: of quantities.
         delimiter: between cells.
         sign: not needed to tell.
+        manifest: as in `read_table`.
     """
-    choice = Choice({**(columns or {})}, {**(units or {})})
+    given, _ = _stated(paths, manifest, {"columns": columns, "units": units, "delimiter": delimiter}, BENCH_KEYS)
+    choice = Choice({**(given["columns"] or {})}, {**(given["units"] or {})})
     files = find_files(paths, FOLDER_SUFFIXES)
     if any(file.stat().st_size > _LARGEST for file in files):
         return False
     try:
-        first = read_tables(files[0], READERS, delimiter)
+        first = read_tables(files[0], READERS, given["delimiter"])
         return any(is_force_velocity(table, choice) for table in first)
     except (ValueError, OSError, ImportError):  # said by who reads them
         return False
+
+
+def _stated(
+    paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+    manifest: str | os.PathLike[str] | bool,
+    given: Contents,
+    keys: Kinds,
+) -> tuple[Contents, list[str]]:
+    """What was given, with what a manifest says beside it, and a note on it."""
+    file = find_manifest(manifest, [paths] if isinstance(paths, str | os.PathLike) else list(paths))
+    if file is None:
+        return given, []
+    stated = {key: value for key, value in read_manifest(file, keys).items() if key in (*given, "show")}
+    return merged(stated, given), [f"read as the manifest {file} says"]

@@ -34,6 +34,7 @@ RIDE_KEYS: Kinds = {
     "delimiter": (str,),
     "show": (dict,),
 }
+TABLE_KEYS: Kinds = {key: BENCH_KEYS[key] for key in ("sign", "columns", "units", "delimiter", "show")}
 _KIND_NAMES = {"dict": "table", "str": "text", "bool": "true or false", "int": "whole number", "float": "number"}
 
 

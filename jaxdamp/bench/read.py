@@ -127,7 +127,7 @@ def read_rides(
     road: Sequence[str | int] | str | int | None = None,
     reversed_channels: Sequence[str] | None = None,
     sampling_rate: float | int | None = None,
-    manifest: str | os.PathLike[str] | None = None,
+    manifest: str | os.PathLike[str] | bool = True,
     **files: Unpack[Files],
 ) -> tuple[RideRecord, ...]:
     r"""Read records of a vehicle on a road or a rig, from text files and all formats of `read`.
@@ -143,7 +143,7 @@ def read_rides(
             `vehicle.wheel_names`; left out, the column "road", or "road 1", "road 2" and so on.
         reversed_channels: channels (or "road") that the file counts positive downwards or in compression.
         sampling_rate: samples per second [Hz], for files without the column "time".
-        manifest: TOML file with these arguments; those of the call take precedence.
+        manifest: a TOML file with these arguments, as in `read`: True takes `jaxdamp.toml` of the folder that is read.
         files: `units`, `delimiter` and `readers`, all optional (see `Files`).
 
     Returns:
@@ -166,11 +166,13 @@ def read_rides(
     asked: list[str | os.PathLike[str]] = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
     given: Contents = {"columns": columns, "road": road, "reversed_channels": reversed_channels}
     given |= files | {"sampling_rate": sampling_rate}
-    own = given.pop("readers")
+    own, note = given.pop("readers"), ()
     readers = with_own(own)
-    file = None if manifest is None else find_manifest(manifest, asked)
-    stated = {} if file is None else read_manifest(file, RIDE_KEYS)
-    given = {key: stated.get(key) if value is None else value for key, value in given.items()}
+    file = find_manifest(manifest, asked)
+    if file is not None:
+        given = merged(read_manifest(file, RIDE_KEYS), given)
+        given |= {table: given[table] or None for table in ("columns", "units")}
+        note = (f"read as the manifest {file} says",)
     if given["sampling_rate"] is not None:
         _checks.positive("sampling_rate", given["sampling_rate"])
     delimiter, found = given.pop("delimiter"), find_files(asked, {*FOLDER_SUFFIXES, *(own or {})})
@@ -182,7 +184,7 @@ def read_rides(
         lambda tables, name: [ride_record(table, base, how) for table, base in _named(tables, name)],
     )
     _raise(errors)
-    return tuple(records)
+    return tuple(replace(record, notes=(*record.notes, *note)) for record in records)
 
 
 def _files_of(asked: list[str | os.PathLike[str]], manifest: Contents) -> list[str | os.PathLike[str]]:

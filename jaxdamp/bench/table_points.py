@@ -61,6 +61,12 @@ class How:
     side: str | None
 
 
+def stated_sign(table: RawTable) -> str | None:
+    """The direction that the comments of a table state, as those that the library writes do; None without one."""
+    found = re.search(r"velocity is positive in (extension|rebound|compression)", " ".join(table.preamble))
+    return None if found is None else f"{'compression' if found[1] == 'compression' else 'rebound'}-positive"
+
+
 def is_force_velocity(table: RawTable, choice: Choice) -> bool:
     """Whether a table of a file holds points of forces over velocity rather than a record over time."""
     table = with_headers(table)

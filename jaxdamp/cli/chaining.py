@@ -1,5 +1,6 @@
 """The whole chain: `jaxdamp report` with records, and `jaxdamp demo` on a damper whose truth is known."""
 
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -64,9 +65,12 @@ def report(
             raw = reading.raw(files)
         sound, preflight = reading.checked(screen, raw, refuse=True)
         runs = reading.processed(sound)
+        commands = {run.command for run in runs}
         groups, divided = grouped(runs, None)
-        if len(groups) > 1:
-            raise ValueError(f"A report is on one setting of a damper: name the records of one. {divided}")
+        if len(groups) > 1 or len(commands) > 1:
+            stated = f"These state {len(commands)} commands: jaxdamp fit makes one law of them, jaxdamp tune takes it."
+            one = "A report is on one setting of a damper: name the records of one."
+            raise ValueError(f"{one} {divided.partition(' To say it')[0] or stated}")
         remarks = decisions(runs)
         screen.details(records_table(tuple(runs)))
         screen.points(remarks)
@@ -200,7 +204,8 @@ def run_demo(screen: Screen, scenario: Scenario, output: Output) -> None:
         target = work.results.target
     screen.details(screen.times_table())
     screen.say(f"Open {target / 'report.html'}. The records are files like those of a real bench; fit them yourself:")
-    screen.say(f'  jaxdamp fit {target / "records"} --held-out "{scenario.held_out}" --sign rebound-positive', "bold")
+    records = shlex.quote(str(target / "records"))
+    screen.say(f'  jaxdamp fit {records} --held-out "{scenario.held_out}" --sign rebound-positive', "bold")
 
 
 def _page(

@@ -41,27 +41,30 @@ class Controlling:
             groundhook, hybrid, acceleration-driven, power-driven, state-feedback, preview, lqr), or the
             controller.json of a tuning; the law must take a command. The baseline of a ride, if none is given, is the
             same law at its own command.
-        period: between two samples of the controller [s].
-        delay: from a sample to its command [s].
-        actuator_lag: time constant of the valve or the coil [s].
-        sensor_lag: time constant of the sensors [s].
+        period: between two samples of the controller [s]; 5 ms if left out.
+        delay: from a sample to its command [s]; 0 if left out.
+        actuator_lag: time constant of the valve or the coil [s]; 0 if left out.
+        sensor_lag: time constant of the sensors [s]; 0 if left out.
     """
 
     controller: str | None = None
-    period: float = 5e-3
-    delay: float = 0.0
-    actuator_lag: float = 0.0
-    sensor_lag: float = 0.0
+    period: float | None = None
+    delay: float | None = None
+    actuator_lag: float | None = None
+    sensor_lag: float | None = None
 
     def of(self, car: AbstractVehicle, law: AbstractDamper | None) -> AbstractVehicle:
         """The vehicle with a law, or its own, under the controller; itself if there is none."""
+        given = {name: getattr(self, name) for name in ("period", "delay", "actuator_lag", "sensor_lag")}
+        times = {name: value for name, value in given.items() if value is not None}
         if self.controller is None:
+            for name, value in times.items():
+                _checks.refuse(name, "be given with --controller, whose it is", value, "Or leave it out.")
             return car
         if law is not None and not takes_command(law):
             remedy = "The law that jaxdamp fit makes of records at several commands does."
             _checks.refuse("law", "take a command, which --controller sets", type(law).__name__, remedy)
         policy = parse_policy(self.controller, car)
-        times = {field: getattr(self, field) for field in ("period", "delay", "actuator_lag", "sensor_lag")}
         return control.Controlled(car, policy, **times)
 
 

@@ -1,5 +1,6 @@
 """`jaxdamp export`: a law or a vehicle as C, FMU or the table of a simulator; `jaxdamp explore`: as a page."""
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ from jaxdamp._words import first_upper
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.records import Reading
-from jaxdamp.cli.riding import USUAL, parse_road
+from jaxdamp.cli.riding import USUAL, parse_road, unusual
 from jaxdamp.cli.vehicle_words import commanded, parse_vehicle, read_law, read_module
 from jaxdamp.dampers import AbstractDamper, command_words
 from jaxdamp.vehicles import AbstractVehicle
@@ -43,12 +44,19 @@ class OneFile:
     file: Path | None = None
     replace: bool = False
 
-    def checked(self, name: str) -> Path:
-        """The file to write, refused if it exists and is not to be replaced; by this name if none is given."""
+    def checked(self, name: str, beside: Sequence[str] = ()) -> Path:
+        """The file to write, refused if it or one beside it exists and is not to be replaced.
+
+        Arguments:
+            name: of the file if none or a folder is given.
+            beside: endings, in place of its own, of the files that are written with it.
+        """
         file = Path(name) if self.file is None else self.file
-        if file.exists() and not self.replace and not file.is_dir():
-            _checks.refuse("file", "be a new file", file, "Give another name, or --replace.")
-        return file
+        whole = file / name if file.is_dir() else file
+        for each in (whole, *(whole.with_name(f"{whole.stem}{ending}") for ending in beside)):
+            if each.exists() and not self.replace:
+                _checks.refuse("file", "be a new file", each, "Give another name, or --replace.")
+        return whole
 
 
 def export_command(
@@ -81,7 +89,8 @@ def export_command(
             if given is not None:
                 _checks.refuse(name, f"be left out for {to}", given, "Its reader wants units and sign as they are.")
     ending, write = (PROGRAMS | TABLES)[to]
-    file = output.checked(law.stem.replace("-", "_") + ending)
+    name = re.sub(r"^(?=\d)|\W", "_", law.stem, flags=re.ASCII)  # an identifier of C
+    file = output.checked(name + ending, (".h", "_test.c") if to == "c" else ())
     if to in PROGRAMS:
         if velocities is not None:
             _checks.refuse("velocities", f"be left out for {to}", velocities, "It has the law itself, not a table.")
@@ -135,7 +144,10 @@ def explore(
     del show_units, show_sign  # what shows numbers asks for them
     file, damper = output.checked(f"{law.stem}.html"), read_law("law", law)
     kind, _, word = road.partition(":")
-    how_long = duration or USUAL
+    if duration is not None:
+        _checks.positive("duration", duration)
+    screen.points(unusual(road, speed), style="yellow")
+    how_long = USUAL if duration is None else duration
     written = export.to_explorer(
         damper,
         file,

@@ -29,6 +29,7 @@ from jaxdamp.report import (
 from jaxdamp.rig import Rig
 
 
+RIG = ("offset",)
 _BRIEF = ("law", "free", "fit", "held-out fit", "held-out RMSE", "note")  # columns of the ladder at the terminal
 
 
@@ -57,10 +58,11 @@ def fit(
     held_out: Sequence[str] = (),
     reading: Reading,
     how: Annotated[Call, "identify.fit"],
-    rig: Sequence[str] = ("offset",),
+    rig: Sequence[str] = RIG,
     group_by: str | None = None,
     cross_validate: bool = False,
     baseline: Path | None = None,
+    side: str | None = None,
     each: str | None = None,
     in_control: int | None = None,
     report: Path | None = None,
@@ -84,24 +86,28 @@ def fit(
         held_out: records to score on, not to fit: a name or a pattern, such as "30mm_*".
         rig: what the test machine adds.
         cross_validate: predict each record by the best law fitted to the others.
+        side: of a force-velocity table with one direction only: rebound, compression, or symmetric for both alike.
         each: what a damper of a production line is: every folder with records, every file, or every name in a table
             with the columns damper and file; pip install 'jaxdamp[cluster]'.
         in_control: so many dampers at the beginning were in control: limits of control charts of all, with --each.
     """
     given = {"held_out": held_out, "group_by": group_by, "cross_validate": cross_validate, "baseline": baseline}
     if each is not None:
-        refused = _given(**given, report=report, resume=resume)
+        refused = _given(**given, report=report, resume=resume, side=side)
         options = _options(how, rig)
         machine = options.pop("rig")
         fit_line(screen, files, each, law, machine, reading, options, output, in_control=in_control, refused=refused)
         return
     if in_control is not None:
         _checks.refuse("in_control", "be given with --each", in_control, "Or leave it out.")
-    table = reading.table(files)
+    table = reading.table(files, side)
     kind = None if table is None else through_points(law)
     if table is not None and kind is not None:
-        fit_table(screen, table, kind, output, _given(**given))
+        refused = [*_given(**given, resume=resume), *reading.of_records, *how.given, *["rig"] * (rig != RIG)]
+        fit_table(screen, table, kind, output, report, refused)
         return
+    if table is None and side is not None:
+        _checks.refuse("side", "be given with a force-velocity table", side, "These are records; leave it out.")
     names = law_names(law)
     options = _options(how, rig)
     beside = None if baseline is None else read_law("baseline", baseline)

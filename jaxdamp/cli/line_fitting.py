@@ -42,12 +42,13 @@ def fit_table(
     table: ForceVelocityTable,
     kind: type[dampers.Table] | type[dampers.SplineTable],
     output: Output,
+    report: Path | None,
     refused: Sequence[str],
 ) -> None:
     """Write the laws through the points of a table: of each setting, and of all as one law of the setting."""
     for option in refused:
         _checks.refuse(option, "be left out with a force-velocity table", "given", "Or fit laws with --law.")
-    with job(screen, "fit", output) as work:
+    with job(screen, "fit", output, report) as work:
         screen.table(table.table())
         screen.points(table.notes)
         with work.saving("Laws and tables") as draft:

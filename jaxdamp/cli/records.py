@@ -18,7 +18,7 @@ from jaxdamp.cli.words import words
 COMMAND = "command"  # stands for what was set on the damper, unless a setting has this name
 _COMPRESSION = Setting("sign", "compression-positive")  # what the reader proposes in its notes
 _COLOURS = {"error": "red", "warning": "yellow", "note": ""}
-_OF_TABLES = ("sign", "columns", "units", "delimiter")  # what is said of a force-velocity table too
+_OF_TABLES = ("sign", "columns", "units", "delimiter", "manifest")  # what is said of a force-velocity table too
 _LINES = 5  # of findings at the terminal
 _CUT_OFF = ("rest before", "rest after")  # findings on what `process(moving=True)` cuts off
 
@@ -33,7 +33,6 @@ class Reading:
         cycles: full cycles to keep: 3 or last:3, or skip:2.
         keep_rest: keep the rest before and after the motion, which is cut off otherwise.
         keep_bad: use records with an error as they are, and fit those that contradict each other together.
-        side: of a force-velocity table with one direction only: rebound, compression, or symmetric for both alike.
     """
 
     read: Annotated[Call, "bench.read"]
@@ -41,18 +40,24 @@ class Reading:
     cycles: str | None = None
     keep_rest: bool = False
     keep_bad: bool = False
-    side: str | None = None
 
     def raw(self, files: Sequence[Path]) -> BenchSet:
         """The records as they are in the files."""
         return bench.read(list(files), **self.read.arguments())
 
-    def table(self, files: Sequence[Path]) -> ForceVelocityTable | None:
+    def table(self, files: Sequence[Path], side: str | None) -> ForceVelocityTable | None:
         """The force-velocity table that the files are; None for records."""
         given = {name: self.read.given[name] for name in _OF_TABLES if name in self.read.given}
         if "sampling_rate" in self.read.given or not bench.are_tables(list(files), **given):
             return None
-        return bench.read_table(list(files), side=self.side, **given)
+        return bench.read_table(list(files), side=side, **given)
+
+    @property
+    def of_records(self) -> list[str]:
+        """The options given that are about records over time, of which a force-velocity table has none."""
+        read = [name for name in self.read.given if name not in _OF_TABLES]
+        own = [name for name in ("cycles", "keep_rest", "keep_bad") if getattr(self, name)]
+        return [*read, *self.steps.given, *own]
 
     def processing(self) -> dict[str, object]:
         """The steps of `BenchRun.process`.

@@ -70,10 +70,12 @@ class Driving:
             if self.duration is not None:
                 _checks.refuse("duration", "be left out on a white road", self.duration)
             return [roads.white(rest, self.speed)] * count, Run()
-        length = self.duration or USUAL
+        if self.duration is not None:
+            _checks.positive("duration", self.duration)
+        length = USUAL if self.duration is None else self.duration
         seeds = range(self.seed, self.seed + count)
         realisations = [parse_road(word, speed=self.speed, duration=length, seed=seed) for seed in seeds]
-        own = length if self.duration or kind == "iso" else realisations[0].duration or length
+        own = length if self.duration is not None or kind == "iso" else realisations[0].duration or length
         return realisations, Run(duration=own, dt=self.dt)
 
 
@@ -162,14 +164,17 @@ def ride(
         baseline: to compare with: another law, or another vehicle, as JSON.
     """
     law, make = None if start is None else read_law("start", start), parse_vehicle(vehicle)
-    own, name = with_dampers_at(make(law), command), "vehicle" if law is None else "law"
+    own, name = make(law), "vehicle" if law is None else "law"
+    if command is not None and own.passive is not own:
+        _checks.refuse("command", "be left out of a vehicle with a controller, which sets it", command)
+    own = with_dampers_at(own, command)
     cars = {name: controlling.of(own, law)}
     if baseline is not None or controlling.controller is not None:  # at its own command
         cars = {"baseline": own if baseline is None else read_baseline(baseline, own)} | cars
     (surface,), run = driving.over(road)
     if not isinstance(surface, AbstractRoad):
         refuse_road(road)
-    run["duration"] = driving.duration or surface.duration or USUAL  # an iso road in full
+    run["duration"] = surface.duration or USUAL if driving.duration is None else driving.duration  # iso in full
     commands = at_commands(cars)
     screen.points(commands)
     screen.points(unusual(road, driving.speed), style="yellow")

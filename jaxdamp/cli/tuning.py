@@ -109,8 +109,8 @@ def tune_command(
     Dampers whose law has settings, such as that of a manufacturer's sheet, are driven at each of them. Writes the law,
     the vehicle, tables, pictures and a page. Ends with exit code 1 if a limit is not met. Grip is
     limited to +10% of the start by itself; --limit grip=none removes that. With --controller the numbers of the
-    policy are tuned, or what --over names (policy.gain, actuator_lag, car.damper.laws.1.rate), and written as
-    controller.json, which --controller of ride takes.
+    policy are tuned, or what --over names (policy.gain, actuator_lag, car.damper.laws.1.rate). The policy alone is
+    written as controller.json, which --controller of ride takes; vehicle.json has its period, delay and lags too.
 
     Arguments:
         road: iso:A to iso:H, white:A to white:H, bump:HEIGHT:LENGTH [m], or a file of position, height.
@@ -122,8 +122,8 @@ def tune_command(
     car = parse_vehicle(vehicle)(law)
     beside = None if baseline is None else read_baseline(baseline, car)
     surfaces, run = _realisations(road, driving, roads)
+    car = controlling.of(car, law)
     if controlling.controller is not None:
-        car = controlling.of(car, law)
         search = replace(search, given={"over": ["policy.**"], **search.given})
     elif "over" not in search.given and (settings := _settings(car)):
         search = replace(search, given={"over": settings, **search.given})

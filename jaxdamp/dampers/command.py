@@ -64,7 +64,8 @@ def check_commands(argument: str, law: AbstractDamper, commands: ArrayLike) -> N
         slack = NOISE * (levels[-1] - levels[0])
         if lowest < levels[0] - slack or highest > levels[-1] + slack:
             must = f"stay between the levels {levels[0]:g} and {levels[-1]:g} of the law"
-            _checks.refuse(argument, must, f"from {lowest:g} to {highest:g}", "Add a law at a level further out.")
+            given = f"{lowest:g}" if lowest == highest else f"from {lowest:g} to {highest:g}"
+            _checks.refuse(argument, must, given, "Or add a law at a level further out.")
         lowest, highest = (float(np.clip(end, levels[0], levels[-1])) for end in (lowest, highest))
     for end in (lowest, highest):
         with_command(law, end)

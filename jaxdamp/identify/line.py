@@ -258,6 +258,9 @@ def _given(
 def _baseline(baseline: int | Sequence[str], labels: Sequence[str]) -> np.ndarray:
     """The places of the dampers of the baseline."""
     if isinstance(baseline, int):
+        if len(labels) < FEWEST:
+            must = f"be {FEWEST} dampers or more, and there are {len(labels)}"
+            _checks.refuse("baseline", must, baseline, "Control charts need a longer line.")
         if not FEWEST <= baseline <= len(labels):
             must = f"be from {FEWEST} to {len(labels)} dampers"
             _checks.refuse("baseline", must, baseline, "25 or more give limits that hold.")

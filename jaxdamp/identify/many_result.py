@@ -211,7 +211,8 @@ class ManyFits(AbstractResult):
             sure = (np.abs(scores) > OUTLYING) & (apart > CERTAIN * self.standard_errors[fitted, j])
             for k in np.flatnonzero(sure):
                 unit = f" {self.free.owners[j].unit}".rstrip()
-                texts[fitted[k]].append(f"{name} = {values[k]:.4g}{unit} where the others suggest {expected[k]:.4g}")
+                suggested = f"{expected[k]:.4g}{unit}"
+                texts[fitted[k]].append(f"{name} = {values[k]:.4g}{unit} where the others suggest {suggested}")
         return tuple("; ".join([*text, *self._biased(i)]) for i, text in enumerate(texts))
 
     def _biased(self, i: int) -> list[str]:

@@ -50,7 +50,7 @@ def on_signs(scores: Sequence[ChannelScore], at_start: Sequence[ChannelScore]) -
             notes.append(
                 f"{score.channel} of {score.record} runs against the {which} (correlation {against:.2f}): its sign, or"
                 " that of the other channels, is reversed. Accelerations and heights count positive up, travels in"
-                " extension; `read_rides(..., reversed_channels=[...])` and --reversed turn a channel round."
+                " extension; `read_rides(..., reversed_channels=[...])` turns a channel round."
             )
     return notes
 

@@ -80,9 +80,11 @@ def _changes(shown: _rides.Rides) -> str:
     said = []
     for goal, words in _rides.GOALS.items():
         if names := shown.goal(goal):
-            before, after = (float(np.mean([side[name] for name in names])) for side in shown.values)
+            joined = np.max if shown.single else np.mean  # as in the first sentence of its page
+            before, after = (float(joined([side[name] for name in names])) for side in shown.values)
             change = "–" if (percent := percent_change(before, after)) is None else _style.percent(percent)
-            said.append(f"{words} {_style.quantity(after, shown.units[names[0]]) if shown.single else change}")
+            value = "up to " * (len(names) > 1) + _style.quantity(after, shown.units[names[0]])
+            said.append(f"{words} {value if shown.single else change}")
     first, last = map(_style.in_words, shown.names)
     return _style.first_upper(f"{last} against {first}: " * (not shown.single) + ", ".join(said))
 

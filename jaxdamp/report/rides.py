@@ -1,6 +1,6 @@
 """A page on one or several rides: metrics, comfort, use of the dampers, pictures."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Unpack
 
 import numpy as np
@@ -91,12 +91,15 @@ def add_rides(report: Report, responses: Mapping[str, Response], title: str, pre
 def ride_verdict(responses: Mapping[str, Response]) -> list[str]:
     """Comfort, travel and grip in a sentence for each ride, compared with the first one if there are several.
 
+    Of several wheels or seats the largest value is said, of a comparison the change of the mean.
+
     Arguments:
         responses: by name, of one kind of vehicle.
     """
     (first, baseline), *others = responses.items()
     goals = {goal: names for goal in WORDS if (names := baseline.vehicle.goal_metrics(goal))}
-    values = {name: _means(response, goals) for name, response in responses.items()}
+    joined = _mean if others else max
+    values = {name: _joined(response, goals, joined) for name, response in responses.items()}
     if others:
         return [
             f"{name} against {first}: "
@@ -106,7 +109,8 @@ def ride_verdict(responses: Mapping[str, Response]) -> list[str]:
         ]
     units = baseline.metric_units()
     shown = {goal: display().of(units[names[0]]) for goal, names in goals.items()}
-    said = [f"{WORDS[g]} {s(values[first][g]):.3g} {typeset_unit(s.unit)}" for g, s in shown.items()]
+    most = {goal: "up to " * (len(names) > 1) for goal, names in goals.items()}
+    said = [f"{WORDS[g]} {most[g]}{s(values[first][g]):.3g} {typeset_unit(s.unit)}" for g, s in shown.items()]
     feel = ""
     if "comfort" in goals and typeset_unit(units[goals["comfort"][0]]) == "m/s²":
         feel = f" ISO 2631-1 calls such an acceleration {' or '.join(comfort_reaction(values[first]['comfort']))}."
@@ -124,10 +128,16 @@ def _trust(response: Response) -> str:
     return f"; not certain, as the law is extrapolated: {'; '.join(far)}." if far else "."
 
 
-def _means(response: Response, goals: Mapping[str, Sequence[str]]) -> dict[str, float]:
-    """The mean of the metrics of each goal."""
+def _joined(
+    response: Response, goals: Mapping[str, Sequence[str]], joined: Callable[[list[float]], float]
+) -> dict[str, float]:
+    """The metrics of each goal as one number."""
     numbers = response.metrics()
-    return {goal: sum(float(numbers[n]) for n in names) / len(names) for goal, names in goals.items()}
+    return {goal: joined([float(numbers[name]) for name in names]) for goal, names in goals.items()}
+
+
+def _mean(values: list[float]) -> float:
+    return sum(values) / len(values)
 
 
 def ride_tables(responses: Mapping[str, Response]) -> dict[str, Table]:

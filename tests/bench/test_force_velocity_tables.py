@@ -5,7 +5,9 @@ import openpyxl
 import pytest
 
 from jaxdamp import bench, identify
-from jaxdamp.dampers import SplineTable, with_command
+from jaxdamp._display import Display, shown_in
+from jaxdamp.dampers import Bilinear, SplineTable, with_command
+from jaxdamp.export import to_csv
 from jaxdamp.parameters import get
 from jaxdamp.plots import force_velocity_family
 
@@ -67,6 +69,31 @@ def test_what_the_file_does_not_say_is_asked_for(tmp_path, text, options, words)
     with pytest.raises(ValueError) as caught:
         bench.read_table(written(tmp_path, text), **options)
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("sign", ["rebound-positive", "compression-positive"])
+def test_the_table_of_a_law_says_its_sign(tmp_path, sign):
+    law = Bilinear(2600.0, 1200.0)
+    with shown_in(Display(sign=sign)):
+        to_csv(law, tmp_path / "law.csv", np.linspace(-0.5, 0.5, 11))
+    curve = bench.read_table(tmp_path / "law.csv").curves[0]
+    np.testing.assert_allclose(curve.force, law.force_velocity(curve.velocity), rtol=1e-9, atol=1e-9)
+
+
+def test_a_manifest_says_how_a_table_is_read(tmp_path):
+    folder = tmp_path / "sheets"
+    folder.mkdir()
+    written(folder, "velocity [m/s],force\n-0.5,-30\n0.5,50\n")
+    manifest = folder / "jaxdamp.toml"
+    manifest.write_text('sign = "compression-positive"\n[units]\nforce = "kgf"\n')
+    table = bench.read_table(folder)
+    assert bench.are_tables(folder) and f"read as the manifest {manifest} says" in table.notes
+    np.testing.assert_allclose(table.curves[0].force, [-50 * 9.80665, 0.0, 30 * 9.80665][::2], rtol=1e-12)
+    given = bench.read_table(folder, units={"force": "N"}, sign="rebound-positive")
+    np.testing.assert_allclose(given.curves[0].force, [-30.0, 50.0])
+    manifest.write_text("command = 3\n")
+    with pytest.raises(ValueError, match="unknown key 'command'; there are sign, columns, units"):
+        bench.read_table(folder)
 
 
 def test_settings_stand_in_rows_blocks_sheets_and_headers(tmp_path):

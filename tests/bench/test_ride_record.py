@@ -41,6 +41,12 @@ def test_columns_of_a_file_get_names_units_and_signs(tmp_path):
     np.testing.assert_allclose(one["sprung_acceleration"], 9.80665 * WAVE)
     np.testing.assert_allclose(one["front_stroke"], -0.005 * WAVE)
     assert one.units == UNITS
+    manifest.rename(tmp_path / "jaxdamp.toml")  # taken by itself, as that of bench records
+    (two,) = read_rides(tmp_path)
+    np.testing.assert_array_equal(two["front_stroke"], one["front_stroke"])
+    assert f"read as the manifest {tmp_path / 'jaxdamp.toml'} says" in two.notes
+    with pytest.raises(ValueError, match="has no column `road`"):
+        read_rides(tmp_path, manifest=False)
 
 
 def test_forces_on_the_wheels_are_known_by_their_unit(tmp_path):

@@ -105,3 +105,15 @@ def test_refusals(law: Path) -> None:
     jaxdamp("export", law, "--to", "csv")
     assert "Option --file must be a new file" in refused(folder, "export", law, "--to", "csv")
     jaxdamp("export", law, "--to", "csv", "--replace")
+    for mine in ("front_law.h", "front_law_test.c"):
+        (folder / mine).write_text("mine")
+        for words in ((), ("--file", folder)):
+            said = refused(folder, "export", law, "--to", "c", *words)
+            assert "Option --file must be a new file" in said and mine in said
+        (folder / mine).unlink()
+
+
+def test_any_name_of_a_law_becomes_a_name_of_c(law: Path) -> None:
+    law.rename(law.parent / "2 Dämpfer.json")
+    assert "_2_D_mpfer_test.c" in jaxdamp("export", "2 Dämpfer.json", "--to", "c").output
+    assert "Option --file must be" in refused(law.parent, "export", "2 Dämpfer.json", "--to", "c", "--file", "2.c")

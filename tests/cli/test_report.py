@@ -45,3 +45,13 @@ def test_a_white_road_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("")
     words = ("report", tmp_path / "a.csv", "--road", "white:C")
     assert "Option --road must be one to ride on" in refused(tmp_path, *words)
+
+
+def test_records_at_several_commands_are_not_pooled(tmp_path: Path) -> None:
+    for name, law in {"soft": Bilinear(2600.0, 1200.0), "hard": Bilinear(5200.0, 2400.0)}.items():
+        bench.VirtualDyno(law).run([SineTest(0.02, f, name=f"{name}_{f:g}Hz") for f in (1.0, 2.0)]).write(tmp_path)
+    words = ("report", tmp_path, "--law", "bilinear", "--out", tmp_path / "out")
+    said = refused(tmp_path, *words, "--sign", "rebound-positive", "--command", "soft*=0,hard*=1")
+    assert "name the records of one. These state 2 commands: jaxdamp fit makes one law of them" in said
+    said = refused(tmp_path, *words, "--sign", "rebound-positive")
+    assert "taken as settings hard, soft, by a word of their names." in said and "--command" not in said

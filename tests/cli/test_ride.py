@@ -75,6 +75,9 @@ def test_a_ride_says_at_which_command_its_dampers_are(law: Path, tmp_path: Path)
         (["quarter_car_000", "bump:3"], "ROAD must read like bump:HEIGHT:LENGTH"),
         (["quarter_car_000", "nothing.csv"], "a file that is there, but is 'nothing.csv'"),
         (["quarter_car_000", "--speed", "-3"], "Option --speed must be positive"),
+        (["quarter_car_000", "--duration", "0"], "Option --duration must be positive"),
+        (["quarter_car_000", "--delay", "0.05"], "Option --delay must be given with --controller"),
+        (["quarter_car_000", "--actuator-lag", "0"], "Option --actuator-lag must be given with --controller"),
         (["quarter_car_000", "--dt", "0.1"], "a fifth of the period of the fastest mode that follows the road"),
     ],
 )

@@ -57,6 +57,24 @@ def test_what_says_nothing_of_a_sheet_is_refused(sheet: Path) -> None:
     assert "without hysteresis" in refused(sheet.parent, *words, "--law", "bouc_wen")
     assert "force-velocity table" in refused(sheet.parent, *words, "--cross-validate")
     assert "'imperial'" in refused(sheet.parent, *words, "--units", "imperal")
+    for option in (
+        ["--filter", "50"],
+        ["--cycles", "3"],
+        ["--keep-bad"],
+        ["--command", "3"],
+        ["--rig", "gas"],
+        ["--bound", "force=0:3"],
+        ["--starts", "4"],
+        ["--resume"],
+    ):
+        said = refused(sheet.parent, *words, *option)
+        assert f"Option {option[0]} must be left out with a force-velocity table" in said, option
+
+
+def test_a_table_has_its_page_where_it_is_asked_for(sheet: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    draw_nothing(monkeypatch)
+    jaxdamp("fit", sheet, "--out", sheet.parent / "fit", "--report", sheet.parent / "page.html")
+    assert "Forces of sheet" in (sheet.parent / "page.html").read_text()
 
 
 def test_units_outside_their_table_are_not_overlooked(sheet: Path, monkeypatch: pytest.MonkeyPatch) -> None:
