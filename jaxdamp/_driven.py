@@ -1,11 +1,13 @@
 """States of ordinary differential equations by the solvers of diffrax; imported when asked for."""
 
+import dataclasses
 from collections.abc import Callable
 
 import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import optimistix as optx
 from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, Float, PyTree
@@ -16,6 +18,7 @@ from jaxdamp._types import Scalar, Signal, State
 
 
 STEPS_PER_INSTANT = 1000  # on average: more are a law too fast for the solver, and would take for ever
+NEGLIGIBLE = 1e-3  # of the tolerance: smaller Newton steps of an implicit solver are rounding errors
 
 
 def check_solver(solver: object, rtol: float, atol: float) -> None:
@@ -56,7 +59,7 @@ def solve(
         every: states are saved at one instant in so many.
         steps_per_instant: after so many times the number of instants it gives up.
     """
-    forward = mode == "forward"
+    forward, solver = mode == "forward", _quiet_at_rest(solver)
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(lambda t, y, args: field(jnp.asarray(t), y)),
         solver,
@@ -74,6 +77,25 @@ def solve(
     )
     assert solution.ys is not None
     return (jax.tree.map(_forward_only.bind, solution.ys) if forward else solution.ys), solution.result
+
+
+def _quiet_at_rest(solver: diffrax.AbstractSolver) -> diffrax.AbstractSolver:
+    """An implicit solver whose Newton steps have converged where they are rounding errors.
+
+    By itself it compares two of them, takes the second for divergence if it is the larger one, and shortens its step
+    until it gives up: at rest a stiff law would never pass.
+    """
+    finder = getattr(solver, "root_finder", None)
+    if not isinstance(finder, diffrax.VeryChord) or callable(finder.norm):  # a norm of one's own
+        return solver
+
+    return dataclasses.replace(solver, root_finder=dataclasses.replace(finder, norm=_without_rounding))
+
+
+def _without_rounding(errors: PyTree) -> Scalar:
+    """The root mean square of errors relative to the tolerance; 0 far below it."""
+    size = optx.rms_norm(errors)
+    return jnp.where(size < NEGLIGIBLE, jnp.zeros_like(size), size)
 
 
 _FORWARD_ONLY = "pass no reverse derivatives (`jax.grad`) as they are. Pass `simulation.Adaptive(..., mode='reverse')`"
