@@ -99,7 +99,7 @@ class Measurement(eqx.Module):
         assert isinstance(self.ride, ScenarioRide)
         return self.objective.of_each(self.ride.of_vehicle(vehicle).each())
 
-    def reported(self, each: Mapping[str, Array]) -> dict[str, float]:
+    def reported(self, each: Mapping[str, Array | np.ndarray]) -> dict[str, float]:
         """The metrics of `each` as they are printed: joined by the true risk, not by the smooth one of a search."""
         assert isinstance(self.ride, ScenarioRide)
         risk, weights = exact(self.ride.risk), self.ride.weights

@@ -1,5 +1,6 @@
 """Force-velocity tables: units, signs, directions and settings as sheets have them; and several tests in one file."""
 
+import jax.numpy as jnp
 import numpy as np
 import openpyxl
 import pytest
@@ -77,7 +78,7 @@ def test_the_table_of_a_law_says_its_sign(tmp_path, sign):
     with shown_in(Display(sign=sign)):
         to_csv(law, tmp_path / "law.csv", np.linspace(-0.5, 0.5, 11))
     curve = bench.read_table(tmp_path / "law.csv").curves[0]
-    np.testing.assert_allclose(curve.force, law.force_velocity(curve.velocity), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(curve.force, law.force_velocity(jnp.asarray(curve.velocity)), rtol=1e-9, atol=1e-9)
 
 
 def test_a_manifest_says_how_a_table_is_read(tmp_path):
