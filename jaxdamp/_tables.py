@@ -256,8 +256,8 @@ def typeset_unit(unit: str, none: str = "") -> str:
 
 
 def percent_change(before: float, after: float) -> float | None:
-    """Change relative to the size of what it was [%], positive if it rises; none from zero."""
-    return 100.0 * (after - before) / abs(before) if before else None
+    """Relative change [%]; none from zero."""
+    return 100.0 * (after / before - 1.0) if before else None
 
 
 class Compared(NamedTuple):

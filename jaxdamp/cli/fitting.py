@@ -106,8 +106,6 @@ def fit(
         refused = [*_given(**given, resume=resume), *reading.of_records, *how.given, *["rig"] * (rig != RIG)]
         fit_table(screen, table, kind, output, report, refused)
         return
-    if table is None and side is not None:
-        _checks.refuse("side", "be given with a force-velocity table", side, "These are records; leave it out.")
     names = law_names(law)
     options = _options(how, rig)
     beside = None if baseline is None else read_law("baseline", baseline)

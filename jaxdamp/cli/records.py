@@ -49,6 +49,8 @@ class Reading:
         """The force-velocity table that the files are; None for records."""
         given = {name: self.read.given[name] for name in _OF_TABLES if name in self.read.given}
         if "sampling_rate" in self.read.given or not bench.are_tables(list(files), **given):
+            if side is not None:
+                _checks.refuse("side", "be given with a force-velocity table", side, "These are records; leave it out.")
             return None
         return bench.read_table(list(files), side=side, **given)
 

@@ -164,10 +164,7 @@ def ride(
         baseline: to compare with: another law, or another vehicle, as JSON.
     """
     law, make = None if start is None else read_law("start", start), parse_vehicle(vehicle)
-    own, name = make(law), "vehicle" if law is None else "law"
-    if command is not None and own.passive is not own:
-        _checks.refuse("command", "be left out of a vehicle with a controller, which sets it", command)
-    own = with_dampers_at(own, command)
+    own, name = with_dampers_at(make(law), command), "vehicle" if law is None else "law"
     cars = {name: controlling.of(own, law)}
     if baseline is not None or controlling.controller is not None:  # at its own command
         cars = {"baseline": own if baseline is None else read_baseline(baseline, own)} | cars

@@ -140,10 +140,12 @@ def with_dampers_at(vehicle: AbstractVehicle, command: float | None) -> Abstract
     """The vehicle with its dampers that take a command at that of the option --command; itself without one.
 
     Raises:
-        ValueError: no damper of the vehicle takes a command, or one not this one.
+        ValueError: no damper of the vehicle takes a command, or one not this one; a vehicle with a controller.
     """
     if command is None:
         return vehicle
+    if vehicle.passive is not vehicle:
+        _checks.refuse("command", "be left out of a vehicle with a controller, which sets it", command)
     laws = {path: get(vehicle, path) for path in damper_places(vehicle)}
     for path, law in ({path: law for path, law in laws.items() if takes_command(law)} or laws).items():
         vehicle = eqx.tree_at(lambda car, path=path: get(car, path), vehicle, commanded(law, command))

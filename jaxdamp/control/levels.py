@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper, Scheduled
-from jaxdamp.vehicles.frame import LiftOffWithLaws
+from jaxdamp.vehicles import LiftOffWithLaws
 
 
 HELD, STEPS = 0.2, 200  # s, and steps, in which friction and hysteresis at a velocity settle

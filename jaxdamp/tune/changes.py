@@ -4,12 +4,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from jaxdamp._tables import percent_change
 from jaxdamp.vehicles import AbstractVehicle
 
 
 if TYPE_CHECKING:
     from jaxdamp.tune.result import TuneResult
+
+
+def relative_change(before: float, after: float) -> float | None:
+    """The change relative to the size before [%], positive where it rises, also of what is negative; none from zero."""
+    return 100.0 * (after - before) / abs(before) if before else None
 
 
 def signed_metrics(result: "TuneResult[AbstractVehicle]") -> set[str]:
@@ -27,7 +31,7 @@ def change_in_percent(result: "TuneResult[AbstractVehicle]", name: str, before: 
         before: its value at the start, in its unit.
         after: its value at the end, in its unit.
     """
-    return None if name in signed_metrics(result) else percent_change(before, after)
+    return None if name in signed_metrics(result) else relative_change(before, after)
 
 
 def mean_change(result: "TuneResult[AbstractVehicle]", name: str) -> float | None:

@@ -7,7 +7,8 @@ from typing import final
 import numpy as np
 from jaxtyping import Bool, Float
 
-from jaxdamp._tables import Column, Contents, Table, percent_change, plain
+from jaxdamp._tables import Column, Contents, Table, plain
+from jaxdamp.tune.changes import relative_change
 from jaxdamp.tune.rescoring import Rescore
 
 
@@ -75,7 +76,7 @@ def beside_next(combinations: Combinations, metric: str, fresh: Rescore | None) 
     """
     if fresh is None:
         values = combinations.metrics[metric]
-        change = percent_change(values[1], values[0])
+        change = relative_change(values[1], values[0])
         words = "" if change is None else f"{change:+.1f} %"
     else:
         half, mean = 100.0 * fresh.half_width(metric), 100.0 * float(np.mean(fresh.change(metric)))

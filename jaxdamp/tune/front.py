@@ -10,10 +10,11 @@ from jaxtyping import Bool, Float
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._status import Status
-from jaxdamp._tables import Column, Contents, Table, percent_change, plain, typeset_unit, with_unit
+from jaxdamp._tables import Column, Contents, Table, plain, typeset_unit, with_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import MetricValues
 from jaxdamp.parameters import FreeParameters
+from jaxdamp.tune.changes import relative_change
 from jaxdamp.tune.measuring import Measurement
 from jaxdamp.tune.result import V
 from jaxdamp.vehicles import AbstractVehicle
@@ -156,7 +157,7 @@ class ParetoFront(AbstractResult, Generic[V]):
         if self.status is Status.LIMIT_NOT_MET:
             return f"No design within the limits; the nearest one: {' '.join(self.warnings[:1])} {'; '.join(ends)}."
         knee = ", ".join(f"{name} {self.values[name][self.knee]:.4g}" for name in self.names)
-        changes = [percent_change(self.before[n], float(self.values[n][self.knee])) for n in self.names]
+        changes = [relative_change(self.before[n], float(self.values[n][self.knee])) for n in self.names]
         from_start = ["from 0" if change is None else f"{change:+.1f} %" for change in changes]
         return (
             f"{len(self)} points, {'; '.join(ends)}. Knee at point {self.knee}: {knee} "

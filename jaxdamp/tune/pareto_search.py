@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Unpack
+from typing import TypeVar, Unpack
 
 import jax.numpy as jnp
 import numpy as np
@@ -33,6 +33,7 @@ from jaxdamp.tune.verdict import missed_notes
 from jaxdamp.vehicles import AbstractVehicle
 
 
+T = TypeVar("T")
 BEYOND = 0.1  # distance of the default reference point beyond the worst values, relative to their range
 FRESH_ROADS, MAX_STEPS = 3, 40  # by default
 
@@ -115,16 +116,14 @@ def pareto(
     filled = between if len(chosen) > len(names) else 0
     if filled:
         designs, numbers = _with_designs_between(evaluator, designs, numbers, limits, between)
-    if smooth_in_scenarios(task.measured.ride):
-        designs, numbers = _best_of(names, designs, _by_true_risk(task, designs, numbers))
-        before = task.measured.reported(task.measured.each(vehicle))
+    designs, numbers, before = _as_printed(task, designs, numbers, before)
     worst = {name: float(numbers[name].max() + BEYOND * np.ptp(numbers[name])) for name in names}
     fresh, start_on_fresh = _on_fresh_roads(evaluator, designs, settings["fresh_roads"])
     front = ParetoFront[V](
         start=vehicle,
         names=names,
-        values={name: numbers[name] for name in task.units},
-        before={name: before[name] for name in task.units},
+        values=_of_metrics(task, numbers),
+        before=_of_metrics(task, before),
         units=task.units,
         parameters=_parameters(space),
         designs=designs,
@@ -137,9 +136,24 @@ def pareto(
         dropped=len(states) - len(chosen),
         free=space.free,
         measured=task.measured,
-        fresh={name: fresh[name] for name in task.units if fresh},
+        fresh=_of_metrics(task, fresh),
     )
     return dataclasses.replace(front, warnings=(*notes, *_notes_on_points(front, task, fresh, start_on_fresh)))
+
+
+def _of_metrics(task: DesignTask[V], numbers: Mapping[str, T]) -> dict[str, T]:
+    """The numbers of metrics and objectives among those of a search; none of none."""
+    return {name: numbers[name] for name in task.units if numbers}
+
+
+def _as_printed(
+    task: DesignTask[V], designs: np.ndarray, numbers: dict[str, np.ndarray], before: dict[str, float]
+) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str, float]]:
+    """The front and the numbers of the start by the true risk of scenarios where the search has a smooth one."""
+    if not smooth_in_scenarios(task.measured.ride):
+        return designs, numbers, before
+    best = _best_of(task.objective.names, designs, _by_true_risk(task, designs, numbers))
+    return *best, task.measured.reported(task.measured.each(task.vehicle))
 
 
 def _parameters(space: SearchRange) -> tuple[FrontParameter, ...]:

@@ -15,7 +15,7 @@ from jaxdamp._status import Status
 from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, typeset_unit, with_unit
 from jaxdamp._types import Figure
 from jaxdamp._warned import warn
-from jaxdamp.tune.changes import change_in_percent, mean_change
+from jaxdamp.tune.changes import change_in_percent, mean_change, relative_change
 from jaxdamp.tune.combinations import Combinations
 from jaxdamp.tune.limits import LimitRange, written
 from jaxdamp.tune.objective import Objective, Targets
@@ -160,7 +160,7 @@ class TuneResult(AbstractResult, Generic[V]):
     def ending(self) -> str:
         """The change on the road of the tuning, bounds and limits with their price, and extreme scenarios, in words."""
         before, after, unit = self.before[self.metric], self.after[self.metric], self.units[self.metric]
-        change = percent_change(before, after)
+        change = relative_change(before, after)
         share = "" if change is None else f" ({change:+.1f} %)"
         stops = [f"{name} {at_limit(self, name)}" for name in self.active_limits]
         at_bounds = [f"{change.name} {change.note}" for change in self.parameters if change.note]
