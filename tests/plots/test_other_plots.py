@@ -335,7 +335,8 @@ def test_axes_of_one_value_are_named_and_not_drawn() -> None:
     assert len(plots.sweep(data, "y", against="z").axes) == 2
     point = data.isel(b=[0])
     for present in ({}, {"a": 3.0, "b": 1.0}):
-        assert plots.sweep(point, "y", present=present).axes[0].get_lines()[0].get_xydata().tolist() == [[3.0, 3.0]]
+        line = plots.sweep(point, "y", present=present).axes[0].get_lines()[0]
+        np.testing.assert_array_equal(line.get_xydata(), [[3.0, 3.0]])
     plots.sweep(point, "y", against="z").canvas.draw()
 
 
