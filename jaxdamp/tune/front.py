@@ -17,6 +17,7 @@ from jaxdamp.parameters import FreeParameters
 from jaxdamp.tune.changes import relative_change
 from jaxdamp.tune.measuring import Measurement
 from jaxdamp.tune.result import V
+from jaxdamp.tune.scenario_ride import smooth_in_scenarios
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -142,7 +143,8 @@ class ParetoFront(AbstractResult, Generic[V]):
 
     def metrics_of(self, vehicle: AbstractVehicle) -> dict[str, float]:
         """Every metric of another vehicle on the same road, such as a baseline."""
-        values = self.measured(vehicle)
+        smooth = smooth_in_scenarios(self.measured.ride)
+        values = self.measured.reported(self.measured.each(vehicle)) if smooth else self.measured(vehicle)
         return MetricValues.with_units({name: float(values[name]) for name in self.units}, self.units)
 
     plot = drawn_by("pareto", "The front with its knee, the start and other vehicles, and the laws along it.")
