@@ -38,16 +38,18 @@ TABLE_KEYS: Kinds = {key: BENCH_KEYS[key] for key in ("sign", "columns", "units"
 _KIND_NAMES = {"dict": "table", "str": "text", "bool": "true or false", "int": "whole number", "float": "number"}
 
 
-def find_manifest(manifest: str | os.PathLike[str] | bool, paths: Sequence[str | os.PathLike[str]]) -> Path | None:
+def find_manifest(
+    manifest: str | os.PathLike[str] | bool | None, paths: Sequence[str | os.PathLike[str]]
+) -> Path | None:
     """The manifest given, or the one in the folder that is read.
 
     Arguments:
         manifest: its path, from here or from the folder; True for `jaxdamp.toml` in the folder, if there is one; False
-            for none.
+            or None for none.
         paths: what is read; only a single folder has a manifest of its own.
     """
     folders = [path for path in map(Path, paths) if path.expanduser().is_dir()] if len(paths) == 1 else []
-    if isinstance(manifest, bool):
+    if isinstance(manifest, bool | None):
         inside = [folder.expanduser() / NAME for folder in folders if manifest]
         return next((file for file in inside if file.is_file()), None)
     given = Path(manifest).expanduser()

@@ -148,11 +148,12 @@ def number_and_unit(stated: float | int | str) -> tuple[float | None, str]:
 
 
 _EDGE = r"(?<![A-Za-z\d.])"
+_MINUS = r"(?:(?<![^\s_(])-)?"  # one that joins words is none
 _IN_NAMES = (  # how adjusters are written in names, and what the numbers are
-    (rf"{_EDGE}(\d+(?:[.,]\d+)?) ?A(?![A-Za-z\d])", ("current",)),
-    (rf"{_EDGE}(\d+(?:[.,]\d+)?) ?V(?![A-Za-z\d])", ("voltage",)),
-    (rf"{_EDGE}(\d+) ?(?:clicks?|clks?)(?![A-Za-z])", ("clicks",)),
-    (rf"{_EDGE}(?:clicks?|clks?)[ _-]?(\d+)(?![\d.])", ("clicks",)),
+    (rf"{_EDGE}({_MINUS}\d+(?:[.,]\d+)?) ?A(?![A-Za-z\d])", ("current",)),
+    (rf"{_EDGE}({_MINUS}\d+(?:[.,]\d+)?) ?V(?![A-Za-z\d])", ("voltage",)),
+    (rf"{_EDGE}({_MINUS}\d+) ?(?:clicks?|clks?)(?![A-Za-z])", ("clicks",)),
+    (rf"{_EDGE}(?:clicks?|clks?)[ _-]?({_MINUS}\d+)(?![\d.])", ("clicks",)),
     (rf"{_EDGE}C ?(\d+)[ _,-]*R ?(\d+)(?![A-Za-z\d.])", ("compression_clicks", "rebound_clicks")),
     (rf"{_EDGE}R ?(\d+)[ _,-]*C ?(\d+)(?![A-Za-z\d.])", ("rebound_clicks", "compression_clicks")),
 )

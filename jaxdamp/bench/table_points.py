@@ -90,7 +90,7 @@ def with_headers(table: RawTable) -> RawTable:
 
 
 def _words(text: str) -> list[str]:
-    return re.findall(r"[a-z]+|\d+(?:\.\d+)?", split_header(text)[0].lower())
+    return re.findall(r"[a-z]+|(?:(?<![^\s_(])-)?\d+(?:\.\d+)?", split_header(text)[0].lower())
 
 
 def _direction(text: str) -> int:
@@ -108,7 +108,7 @@ def _setting(text: str) -> str:
     if found:
         return name.strip()
     words = [word for word in _words(name) if word not in _REBOUND | _COMPRESSION | _SETTING and role_of(word) is None]
-    numbers = [word for word in words if word[0].isdigit()]
+    numbers = [word for word in words if word[-1].isdigit()]
     return numbers[0] if len(numbers) == 1 else " ".join(words)
 
 
@@ -122,7 +122,7 @@ def _forces(table: RawTable, velocity: int, choice: Choice) -> Iterator[int]:
         role, words = role_of(column.name, column.unit), set(_words(column.name))
         if index == velocity or column.is_text or role not in (None, "force"):
             continue
-        speaks = any(word[0].isdigit() for word in words) or words & (_REBOUND | _COMPRESSION)
+        speaks = any(word[-1].isdigit() for word in words) or words & (_REBOUND | _COMPRESSION)
         if role == "force" or speaks or settings_in_name(column.name):
             yield index
 
@@ -130,7 +130,7 @@ def _forces(table: RawTable, velocity: int, choice: Choice) -> Iterator[int]:
 def _column_of_words(table: RawTable, wanted: set[str], besides: Sequence[int]) -> int | None:
     """The column that one of these words names, such as that of the clicks."""
     names = {index: set(_words(name)) for index, name in enumerate(table.names) if index not in besides}
-    named = (i for i, words in names.items() if wanted & words and not any(word[0].isdigit() for word in words))
+    named = (i for i, words in names.items() if wanted & words and not any(word[-1].isdigit() for word in words))
     return next(named, None)
 
 

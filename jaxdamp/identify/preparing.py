@@ -75,7 +75,8 @@ def prepare(
     weighting = settings["weighting"]
     sigma = weights(weighting, runs)
     begin = begun(law, runs, sigma, rig, settings)
-    return begin.problems([runs], [sigma], settings["samples_per_cycle"], each=weighting == "runs")[0]
+    each = isinstance(weighting, str) and weighting == "runs"  # numbers may be an array
+    return begin.problems([runs], [sigma], settings["samples_per_cycle"], each=each)[0]
 
 
 class Beginning(NamedTuple):

@@ -286,7 +286,7 @@ class Chain:
             _checks.refuse("per_record", "name numbers of the machine for a law at settings", ", ".join(of_law), remedy)
         solution = solve(problem, starts=starts, max_steps=self.how["max_steps"], solver=self.how["solver"])
         models, model = fitted_models(problem, solution.best.values)
-        errors = score(models or model, problem.runs)[:2]
+        errors = score(models or model, problem.runs, initial_state=problem.initial_state)[:2]
         open_numbers = undetermined(problem, solution.best)
         return AtSetting(law_of(model), rig_of(model), problem.runs, *errors, solution.closed_form, open_numbers)
 

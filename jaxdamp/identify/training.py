@@ -207,7 +207,8 @@ def train(
                 stopped = f"stopped at step {done}, {patience} steps after the held-out error last fell"
                 break
 
-    trained = with_range(_model(coordinates, best), covered_range(problem.fitted_to))
+    warms = problem.law.traits().temperature_dependent
+    trained = with_range(_model(coordinates, best), covered_range(problem.fitted_to, warms=warms))
     percent, rmse, scores = score(trained, runs, np.isfinite(problem.sigma))
     held_percent, held_rmse, held_scores = score(trained, held_out)
     return Training(

@@ -7,6 +7,7 @@ import pytest
 
 from jaxdamp import bench, identify
 from jaxdamp._display import Display, shown_in
+from jaxdamp.bench.settings import settings_in_name
 from jaxdamp.dampers import Bilinear, SplineTable, with_command
 from jaxdamp.export import to_csv
 from jaxdamp.parameters import get
@@ -95,6 +96,17 @@ def test_a_manifest_says_how_a_table_is_read(tmp_path):
     manifest.write_text("command = 3\n")
     with pytest.raises(ValueError, match="unknown key 'command'; there are sign, columns, units"):
         bench.read_table(folder)
+
+
+def test_settings_below_zero_keep_their_sign(tmp_path):
+    for head in ("R -2 [N],R 0 [N],R +2 [N],C -2 [N],C 0 [N],C +2 [N]", "R-click -2 [N],R 0,R 2,C -2 clicks,C 0,C 2"):
+        text = f"velocity [m/s],{head}\n0.1,100,200,300,50,100,150\n"
+        table = bench.read_table(written(tmp_path, text), units={"force": "N"})
+        assert table.settings == ("-2", "0", "2")
+        assert [curve.force[-1] for curve in table.curves] == [100.0, 200.0, 300.0]
+    names = {"r_-2clicks": -2.0, "-2 clicks": -2.0, "run-2clicks": 2.0, "clicks_-3": -3.0, "a - 3clicks": 3.0}
+    assert {name: settings_in_name(name)["clicks"] for name in names} == names
+    assert settings_in_name("x_-0.5A") == {"current": -0.5}
 
 
 def test_settings_stand_in_rows_blocks_sheets_and_headers(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 
 from jaxdamp import bench, identify
 from jaxdamp.bench import BenchRun, SineTest
-from jaxdamp.dampers import Bilinear, Lag, Linear, Spring, with_fitted_range
+from jaxdamp.dampers import Bilinear, Lag, Linear, Spring, TemperatureScaled, with_fitted_range
 from jaxdamp.identify.model import covered_range
 
 
@@ -56,3 +56,12 @@ def test_training_and_cross_validation_state_it_too(runs):
     for fold, out in zip(identify.cross_validate({"linear": Linear}, runs).folds, range(3), strict=True):
         kept = tuple(run for i, run in enumerate(runs) if i != out)
         assert fold.result.law.fitted_to.velocity == ends(kept, "velocity")
+
+
+def test_many_fits_state_the_temperatures_of_a_law_that_depends_on_them(runs):
+    start = TemperatureScaled(Linear(1500.0), temperature=293.15)
+    stated = [dataclasses.replace(run, settings={"temperature": f"{20 + 30 * i} degC"}) for i, run in enumerate(runs)]
+    many = identify.fit_many(start, {"A": stated}, starts=1)
+    alone = identify.fit(start, stated, starts=1, weighting=np.array([5.0] * len(stated))).law
+    assert alone.fitted_to is not None and alone.fitted_to.temperature is not None
+    assert many["A"].fitted_to == alone.fitted_to

@@ -7,7 +7,7 @@ import pytest
 
 from jaxdamp import identify
 from jaxdamp.bench import SineTest, VirtualDyno
-from jaxdamp.dampers import Bilinear, Linear, ModifiedBoucWen, Scaled, Scheduled, with_command
+from jaxdamp.dampers import Bilinear, Lag, Linear, ModifiedBoucWen, Scaled, Scheduled, with_command
 from jaxdamp.identify.recommending import not_worse
 from jaxdamp.identify.rungs import cannot_choose
 from jaxdamp.parameters import get
@@ -108,6 +108,19 @@ def test_a_comparison_of_laws_that_depend_on_the_setting(runs):
     assert "take no command itself" in comparison.failed[0].reason
     assert list(comparison.best.laws()) == ["bilinear at 0", "bilinear at 1", "bilinear at 2"]
     assert "bilinear interpolated to 1" in comparison.verdict[-1]
+
+
+def test_the_laws_alone_are_judged_from_the_states_that_they_were_fitted_with():
+    """Twelve cycles on, cut in motion: from rest a lag of half a second is far off."""
+    runs = []
+    for command in (0.0, 1.0):
+        dyno = VirtualDyno(Lag(Linear(1500.0 + 500.0 * command), 0.5), sampling_rate=200.0, force_noise=1.0)
+        (run,) = dyno.run(SineTest(0.02, 2.0, cycles=12)).process(between=(4.8, 5.95))
+        runs.append(dataclasses.replace(run, command=command, name=f"{command:g}"))
+    start, how = Lag(Linear(1500.0), 0.4), {"initial_state": "periodic", "rig": None}
+    together = identify.fit_scheduled(start, runs, starts=1, **how)
+    for run, alone in zip(runs, together.alone.values(), strict=True):
+        assert alone.rmse == pytest.approx(identify.fit(start, [run], **how).rmse, rel=0.02)
 
 
 def test_laws_that_the_records_cannot_tell_apart_are_named():

@@ -334,9 +334,8 @@ def test_axes_of_one_value_are_named_and_not_drawn() -> None:
     np.testing.assert_array_equal(axes.get_lines()[0].get_xydata(), [[1.0, 3.0], [2.0, 6.0]])
     assert len(plots.sweep(data, "y", against="z").axes) == 2
     point = data.isel(b=[0])
-    for present in ({}, {"a": 3.0, "b": 1.0}):
-        line = plots.sweep(point, "y", present=present).axes[0].get_lines()[0]
-        np.testing.assert_array_equal(line.get_xydata(), [[3.0, 3.0]])
+    figures = [plots.sweep(point, "y", present=present) for present in ({}, {"a": 3.0, "b": 1.0})]
+    np.testing.assert_array_equal([f.axes[0].get_lines()[0].get_xydata() for f in figures], [[[3.0, 3.0]]] * 2)
     plots.sweep(point, "y", against="z").canvas.draw()
 
 
