@@ -231,7 +231,7 @@ def _spread(model: Model, paths: Sequence[str], records: int) -> Model:
     return with_values(model, {path: jnp.full(records, values[path]) for path in paths})
 
 
-def weights(weighting: str | Sequence[float], runs: Sequence[BenchRun]) -> list[float]:
+def weights(weighting: str | Sequence[float] | np.ndarray, runs: Sequence[BenchRun]) -> list[float]:
     """Standard deviation [N] that the residuals of each record are divided by; infinite for a record to be left out."""
     if isinstance(weighting, str):
         _checks.one_of("weighting", weighting, ["samples", "runs"])

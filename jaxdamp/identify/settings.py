@@ -6,6 +6,8 @@ They are written in the call, or kept for several calls: each class makes a dict
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypedDict
 
+import numpy as np
+
 from jaxdamp.identify.search import Solver
 
 
@@ -74,7 +76,7 @@ class ProblemSettings(Free, Records, total=False):
     """
 
     per_record: Sequence[str]
-    weighting: str | Sequence[float]
+    weighting: str | Sequence[float] | np.ndarray
 
 
 class FitSettings(ProblemSettings, Search, total=False):

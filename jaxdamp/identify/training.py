@@ -58,7 +58,7 @@ class TrainSettings(TypedDict, total=False):
 
     freeze: Sequence[str]
     tie: Mapping[str, str] | None
-    weighting: str | Sequence[float]
+    weighting: str | Sequence[float] | np.ndarray
     samples_per_cycle: int
 
 
