@@ -235,6 +235,11 @@ def _mean_cycle(run: "BenchRun") -> "BenchRun":
     channels: dict[str, Float[np.ndarray, " time"] | Samples] = {
         name: np.tile(getattr(cycles, name).mean(axis=0), 2) for name in CHANNELS
     }
+    warm = None
+    if run.temperature is not None:
+        during = (run.time >= cycles.starts[0]) & (run.time < cycles.starts[-1] + cycles.periods[-1])
+        warm = np.full(len(time), float(np.mean(run.temperature[during])))
     scatter = f"{np.sqrt(np.mean(np.var(cycles.force, axis=0, ddof=1))):.3g} N" if count > 1 else "unknown"
     note = f"mean cycle over {count} cycles, twice; scatter of the force from cycle to cycle {scatter} (RMS)"
-    return _noted(run, note, time=time, **channels, temperature=None)
+    note += "" if warm is None else f", at their mean temperature, {warm[0] - 273.15:.3g} °C"
+    return _noted(run, note, time=time, **channels, temperature=warm)

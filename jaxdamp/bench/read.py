@@ -227,8 +227,15 @@ def _names(files: Sequence[Path]) -> list[str]:
     """The name of each file without its suffix, with its folder or suffix only where others have the same name."""
     names = [file.stem for file in files]
     folders = {name: {f.parent for f in files if f.stem == name} for name in names}
-    names = [f"{f.parent.name}/{f.stem}" if len(folders[f.stem]) > 1 else f.stem for f in files]
+    names = ["/".join((*_apart(f.parent, folders[f.stem]), f.stem)) for f in files]
     return [f"{n} ({f.suffix[1:]})" if names.count(n) > 1 else n for f, n in zip(files, names, strict=True)]
+
+
+def _apart(folder: Path, folders: set[Path]) -> tuple[str, ...]:
+    """As many of the last parts of a folder as tell it from the others."""
+    own, others = folder.parts[::-1], [other.parts[::-1] for other in folders - {folder}]
+    count = next(k for k in range(len(own) + 1) if all(other[:k] != own[:k] for other in others))
+    return own[:count][::-1]
 
 
 def _named(tables: Sequence[RawTable], name: str) -> list[tuple[RawTable, str]]:

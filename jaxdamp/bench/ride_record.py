@@ -4,6 +4,7 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import final
 
@@ -11,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp._tables import Contents
+from jaxdamp._tables import Contents, plain
 from jaxdamp.bench import clock, stamps
 from jaxdamp.bench.columns import given_column
 from jaxdamp.bench.headers import split_header
@@ -102,6 +103,11 @@ class RideRecord:
         """Number of samples."""
         return len(self.time)
 
+    @cached_property
+    def fingerprint(self) -> bytes:
+        """A digest of the samples, the same for a record that is read again, copied or renamed."""
+        return clock.digest(self.time, self.road, *(self.channels[name] for name in sorted(self.channels)))
+
     def __getitem__(self, channel: str) -> Float[np.ndarray, " time"]:
         """A measured channel."""
         _checks.one_of("channel", channel, self.channels)
@@ -135,7 +141,7 @@ class RideRecord:
         header = ["time [s]", *[f"{name} [{ROAD_UNITS[self.driven_by]}]" for name in roads]]
         header += [f"{name} [{self.units[name]}]" for name in self.channels]
         columns = np.column_stack([self.time, self.road, *self.channels.values()])
-        settings = [RIDE_SETTINGS_MARK + json.dumps(dict(self.settings))] if self.settings else []
+        settings = [RIDE_SETTINGS_MARK + json.dumps(plain(self.settings))] if self.settings else []
         rows = [",".join(map(repr, row)) for row in columns.tolist()]
         path = Path(path)
         path.write_text("\n".join([RIDE_MARK, *settings, ",".join(header), *rows]) + "\n", encoding="utf-8")

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks
-from jaxdamp._tables import Contents
+from jaxdamp._tables import Contents, plain
 from jaxdamp._types import Figure
 from jaxdamp.bench import clock
 from jaxdamp.bench.headers import COMMAND_HEADER
@@ -183,6 +183,11 @@ class BenchRun:
         return replace(self, command=float(command), command_channel=None, command_unit="")
 
     @cached_property
+    def fingerprint(self) -> bytes:
+        """A digest of the samples, the same for a record that is read again, copied or renamed."""
+        return clock.digest(self.time, self.stroke, self.velocity, self.force)
+
+    @cached_property
     def frequency(self) -> float:
         """Frequency of the motion [Hz]: one over the median time between passages of mid-stroke in one direction."""
         return dominant_frequency(self.time, self.stroke)
@@ -340,7 +345,7 @@ class BenchRun:
         if self.command_channel is not None:
             channels, header = [*channels, self.command_channel], [*header, f"{COMMAND_HEADER} [{self.command_unit}]"]
         command = [] if self.command is None else [f"{COMMAND_MARK}{self.command!r}"]
-        settings = [SETTINGS_MARK + json.dumps(dict(self.settings))] if self.settings else []
+        settings = [SETTINGS_MARK + json.dumps(plain(self.settings))] if self.settings else []
         integrated = [INTEGRATED_MARK] * self.stroke_is_integrated
         notes = [NOTE_MARK + " ".join(note.split()) for note in self.notes]
         lines = [FILE_MARK, *command, *settings, *integrated, *notes, ",".join(header)]

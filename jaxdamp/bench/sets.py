@@ -1,7 +1,9 @@
 """Several records of a test bench."""
 
+import copy
+import itertools
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
@@ -42,7 +44,7 @@ class BenchSet:
     left_out: tuple[str, ...]
 
     def __init__(self, runs: Iterable[BenchRun] = (), left_out: Iterable[str] = ()) -> None:
-        runs = as_runs(runs)
+        runs = _records(runs, "runs")
         names = [run.name for run in runs]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
@@ -174,9 +176,34 @@ def as_runs(runs: object, argument: str = "runs", call: str = "") -> tuple[Bench
         argument: its name in messages.
         call: how the function is called, for arguments in the wrong order.
 
+    Returns:
+        The records; of several with one name, the others have it with a number, and a note that says so.
+
     Raises:
         ValueError: anything that is no record.
     """
+    records = _records(runs, argument, call)
+    taken = {run.name for run in records}
+    return records if len(taken) == len(records) else tuple(_numbered(records, taken))
+
+
+def _numbered(runs: Sequence[BenchRun], taken: set[str]) -> Iterator[BenchRun]:
+    """The records with different names, of which some are taken already."""
+    seen = set[str]()
+    for run in runs:
+        if run.name not in seen:
+            seen.add(run.name)
+            yield run
+            continue
+        name = next(name for k in itertools.count(2) if (name := f"{run.name} ({k})") not in taken)
+        taken.add(name)
+        other = copy.copy(run)  # which keeps how it was processed
+        object.__setattr__(other, "name", name)
+        object.__setattr__(other, "notes", (*run.notes, f"called {name!r}, as another record is called {run.name!r}"))
+        yield other
+
+
+def _records(runs: object, argument: str, call: str = "") -> tuple[BenchRun, ...]:
     remedy = "Read files with `bench.read(paths)`; `BenchRun.from_arrays` makes a record of arrays."
     remedy = f"The call is `{call}`. {remedy}" if call else remedy
     if isinstance(runs, BenchRun):

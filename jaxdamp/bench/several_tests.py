@@ -21,23 +21,27 @@ def tests_apart(table: RawTable, choice: Choice) -> list[RawTable]:
     """The tests of a table, each a table of its own; the table itself where it holds one.
 
     A test ends where the time falls back to where it started and, if there is a column of tests, where its number
-    changes.
+    changes. Tests by such a column that are too short for a record are left out, and the notes of the others say so.
     """
     numbered = _column_of_tests(table)
     ends = _changes(np.asarray(table.columns[numbered].values)) if numbered is not None else _restarts(table, choice)
     bounds = [0, *ends, len(table)]
-    if not ends or len(bounds) > _MOST or min(np.diff(bounds)) < FEWEST:
+    sizes = np.diff(bounds)
+    if not ends or len(bounds) > _MOST or (min if numbered is None else max)(sizes) < FEWEST:
         return [table]
     why = "the time starts again" if numbered is None else f"column {table.names[numbered]!r} changes"
-    parts = []
+    parts, short = [], []
     for number, (start, stop) in enumerate(itertools.pairwise(bounds), 1):
         name = f"test {number}" if numbered is None else f"test {_word(table.columns[numbered].values[start])}"
+        if stop - start < FEWEST:
+            short.append(f"{name} of the file left out: {stop - start} rows, and a record needs {FEWEST}")
+            continue
         part = _part(table, slice(start, stop), numbered)
         note = f"{name} of {len(bounds) - 1} in the file, where {why}"
         parts.append(replace(part, record=f"{table.record} {name}".strip(), notes=(*table.notes, note)))
     names = [part.record for part in parts]
     again = [f"{name} ({number})" if names.count(name) > 1 else name for number, name in enumerate(names, 1)]
-    return [replace(part, record=name) for part, name in zip(parts, again, strict=True)]
+    return [replace(p, record=name, notes=(*p.notes, *short)) for p, name in zip(parts, again, strict=True)]
 
 
 def _column_of_tests(table: RawTable) -> int | None:

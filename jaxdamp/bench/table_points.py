@@ -94,9 +94,16 @@ def _words(text: str) -> list[str]:
 
 
 def _direction(text: str) -> int:
-    """The direction that a header or a name states: 1 rebound, -1 compression, 0 none or both."""
+    """The direction that a header states: 1 rebound, -1 compression, 0 none or both; by a letter if no word does."""
     words = set(_words(text))
+    spelled = {word for word in words if len(word) > 1}
+    words = spelled if spelled & (_REBOUND | _COMPRESSION) else words
     return int(bool(words & _REBOUND)) - int(bool(words & _COMPRESSION))
+
+
+def _direction_of_name(name: str) -> int:
+    """The direction that a name states, in which a letter beside digits is part of a type or of an adjuster."""
+    return _direction(re.sub(r"(?i)[rc] ?-?\d+|\d[rc](?![a-z])", " ", name))
 
 
 def _setting(text: str) -> str:
@@ -106,7 +113,8 @@ def _setting(text: str) -> str:
         return f"{next(iter(found.values())):g}"
     name = split_header(text)[0]
     if found:
-        return name.strip()
+        spelled = rf"(?i)\b(?:{'|'.join(word for word in _REBOUND | _COMPRESSION if len(word) > 1)})\b"
+        return re.sub(spelled, "", name).strip(" _-,:")
     words = [word for word in _words(name) if word not in _REBOUND | _COMPRESSION | _SETTING and role_of(word) is None]
     numbers = [word for word in words if word[-1].isdigit()]
     return numbers[0] if len(numbers) == 1 else " ".join(words)
@@ -150,7 +158,7 @@ def sides_of(table: RawTable, how: How) -> tuple[list[Side], list[str]]:
             force, units["force"] = in_si(table, index, "force", how.choice)
             there = np.isfinite(velocity) & np.isfinite(force)
             missing += int(np.sum(~there))
-            direction = np.full(len(velocity), _direction(table.names[index]) or _direction(name), dtype=float)
+            direction = np.full(len(velocity), _direction(table.names[index]) or _direction_of_name(name), dtype=float)
             if words is not None:
                 direction = np.array([_direction(str(cell)) for cell in table.columns[words].values], dtype=float)
             settings = np.full(len(velocity), _setting(table.names[index]) or _setting(table.record), dtype=object)
@@ -193,10 +201,12 @@ def curves_of(sides: Sequence[Side], how: How) -> tuple[tuple[Curve, ...], list[
     """The points by setting, both directions joined, and notes."""
     notes: list[str] = []
     points: Directions = {1: {}, -1: {}}
+    columns: dict[tuple[str, str, int], str] = {}
     for side in sides:
         velocity, force = _oriented(side, how, notes)
         for direction, there in ((1, velocity >= 0.0), (-1, velocity < 0.0)):
             if there.any():
+                _once(side, direction, columns)
                 points[direction].setdefault(side.setting, []).append(np.stack([velocity[there], force[there]]))
     for direction, word in ((1, "rebound"), (-1, "compression")):
         if not points[direction]:
@@ -211,6 +221,19 @@ def curves_of(sides: Sequence[Side], how: How) -> tuple[tuple[Curve, ...], list[
     curves = [_curve(name, [*points[-1][name], *points[1][name]], notes) for name in names]
     notes += [f"{len(curves)} settings, by columns, rows or sheets: {', '.join(names)}"] * (len(curves) > 1)
     return tuple(sorted(curves, key=_command)), notes
+
+
+def _once(side: Side, direction: int, columns: dict[tuple[str, str, int], str]) -> None:
+    """Refuse two columns of a table that give the same setting and direction."""
+    table, column = side.where.rsplit(", column ", 1)
+    key = table, side.setting, direction
+    if key in columns:
+        way, setting = "rebound" if direction > 0 else "compression", f" at {side.setting!r}" if side.setting else ""
+        raise ValueError(
+            f"{table}: columns {columns[key]} and {column} both give the force in {way}{setting}. Name a setting in "
+            "each header, such as `4 clicks`, or keep one of them."
+        )
+    columns[key] = column
 
 
 def _command(curve: Curve) -> float:

@@ -13,7 +13,7 @@ from jaxdamp._results import AbstractResult, drawn_by, worst_status
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Contents, Table, plain, with_unit
 from jaxdamp._traced import of_known_numbers
-from jaxdamp.bench import BenchRun, as_runs
+from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.identify.fitting import fit
 from jaxdamp.identify.law_result import AbstractFitted
 from jaxdamp.identify.machine import OFFSET, Machine
@@ -204,9 +204,11 @@ def cross_validate(
         laws: starts by name, as for `fit`; classes and functions are called again for each fit with its records only,
             so that the held-out record has no influence on the start.
         runs: two records or more.
-        by: the group of a record, such as `lambda run: run.command`: the laws are fitted to each group separately.
+        by: the group of a record, such as `lambda run: run.command`: the laws are fitted to each group separately;
+            records for which it gives None are the group "None".
         method: called as `method(start, runs, weighting=..., **options)`, with an infinite weighting for the record
-            held out; the result has a `law`. `fit`, or for networks a function that calls `train`.
+            held out, or without it if `per_record` is asked for; the result has a `law`. `fit`, or for networks a
+            function that calls `train`.
         rig: the test machine as in `compare`. Another method than `fit` gets it only if it is not the default.
         weighting: of the records that are fitted: `"samples"`, or `"runs"`, with which every record counts the same, as
             it does in the mean fit.
@@ -225,7 +227,10 @@ def cross_validate(
     """
     call = "cross_validate(laws, runs)"
     check_starts(laws, call)
-    groups = _grouped(as_runs(runs, call=call), by, nested)
+    records = as_runs(runs, call=call)
+    if options.get("bad_records") == "leave_out":
+        records = usable(records, "leave_out", robust=options.get("loss", "squares") != "squares")
+    groups = _grouped(records, by, nested)
     if method is fit or rig != OFFSET:
         options["rig"] = rig
     jobs = [(name, group, out) for name in laws for group, few in groups.items() for out in _left_out(few, nested)]
@@ -235,7 +240,12 @@ def cross_validate(
             members, names = groups[group], [groups[group][i].name for i in out]
             shown(f"{name} without {' and '.join(names)}, {number} of {len(jobs)}")
             sigma = [np.inf if i in out else s for i, s in enumerate(weights(weighting, members))]
-            result = method(laws[name], members, weighting=sigma, **options)
+            fitted = members
+            if options.get("per_record"):  # a record that is held out has no value of its own
+                fitted, sigma = (
+                    [value for i, value in enumerate(values) if i not in out] for values in (members, sigma)
+                )
+            result = method(laws[name], fitted, weighting=sigma, **options)
             scores = result.score(members)[2]
             for i, other in zip(out, names[::-1] if len(out) > 1 else [None], strict=True):
                 fold = Fold(name, group, scores[i].name, scores[i].fit_percent, scores[i].rmse, result, other)
@@ -249,7 +259,8 @@ def _grouped(
     """The records of each group."""
     groups: dict[Hashable, list[BenchRun]] = {}
     for run in runs:
-        groups.setdefault(None if by is None else by(run), []).append(run)
+        group = None if by is None else by(run)
+        groups.setdefault("None" if by is not None and group is None else group, []).append(run)
     fewest, few = (3, "three") if nested else (2, "two")
     for group, members in groups.items():
         if len(members) < fewest:

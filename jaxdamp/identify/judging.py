@@ -48,7 +48,7 @@ from jaxdamp.identify.problem import AbstractResiduals, Problem, linearised
 from jaxdamp.identify.propagation import Evidence
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution
-from jaxdamp.identify.stated import start_paths
+from jaxdamp.identify.stated import start_paths, stated_values
 from jaxdamp.identify.traces import Batch
 from jaxdamp.parameters import get, modules_inside, parameters, with_values
 
@@ -84,8 +84,12 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     fitted = np.isfinite(problem.sigma)
     percent, rmse, scores = score(models or model, problem.runs, fitted, problem.initial_state)
     notes = on_status(best, estimates.unsettled, _REMEDY)
-    on_records = (*notes_on(model, problem.fitted_to), *off_span(model, problem.fitted_to, problem.initial_state))
-    commands = not_followed(law, problem.fitted_to)
+    pooled = all(p.startswith("rig.") for p in problem.per_record) and not stated_values(model, problem.runs)
+    on_records = (
+        *notes_on(model, problem.fitted_to, pooled=pooled),
+        *off_span(model, problem.fitted_to, problem.initial_state),
+    )
+    commands = not_followed(law, problem.fitted_to, pooled=pooled)
     effects: list[str] = [] if commands else left_out(problem, best)  # which would be taken for what the commands do
     on_rest = on_misfit(noise, estimates.estimates, bool(effects))
     on_records += _averaged(problem, best)
@@ -190,24 +194,29 @@ def _averaged(problem: Problem, best: SearchEnd) -> tuple[str, ...]:
     return tuple(said)
 
 
-def notes_on(model: Model, runs: Sequence[BenchRun]) -> list[str]:
+def notes_on(model: Model, runs: Sequence[BenchRun], *, pooled: bool = True) -> list[str]:
     """Sentences on commands and numbers left out, records that contradict, strokes without place, energy added."""
     law, apart = law_of(model), contradictions_in_words(contradicting(model, runs))
-    return not_followed(law, runs) + _undeclared(law) + apart + _without_place(law, runs) + _driving(law, runs)
+    commands = not_followed(law, runs, pooled=pooled)
+    return commands + _undeclared(law) + apart + _without_place(law, runs) + _driving(law, runs)
 
 
-def not_followed(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
-    """A sentence on commands that vary during a record and have no effect on the law."""
+def not_followed(law: AbstractDamper, runs: Sequence[BenchRun], *, pooled: bool = True) -> list[str]:
+    """A sentence on commands without effect on the law, in a record or, if all are pooled, from one to another."""
     varying = [run for run in runs if run.command_channel is not None]
-    if not varying or takes_command(law):
+    held = {run.command for run in runs if pooled and run.command is not None}
+    if takes_command(law) or (not varying and len(held) < 2):
         return []
-    ends = np.concatenate([run.command_channel for run in varying if run.command_channel is not None])
-    values = f"{ends.min():g} to {ends.max():g} {varying[0].command_unit}".rstrip()
-    return [
-        f"The command of {', '.join(run.name for run in varying[:3])} varies ({values}), which this law does not "
-        "follow: its numbers lie between those at one command and another. Cut the part in which it is held, "
-        "`process(between=(start, stop))`, or fit a law with settings (`dampers.Scheduled`)."
-    ]
+    begin, end = "", "fit a law with settings (`dampers.Scheduled`, `fit_scheduled`)."
+    if varying:
+        ends = np.concatenate([run.command_channel for run in varying if run.command_channel is not None])
+        values = f"{ends.min():g} to {ends.max():g} {varying[0].command_unit}".rstrip()
+        begin = f"The command of {', '.join(run.name for run in varying[:3])} varies ({values})"
+        end = f"Cut the part in which it is held, `process(between=(start, stop))`, or {end}"
+    else:
+        begin = f"The records have several commands ({min(held):g} to {max(held):g})"
+        end = f"Fit the records of one command, or {end}"
+    return [f"{begin}, which this law does not follow: its numbers lie between those at one command and another. {end}"]
 
 
 def _undeclared(law: AbstractDamper) -> list[str]:

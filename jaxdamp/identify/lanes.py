@@ -12,9 +12,11 @@ from jaxdamp._triangles import rows_of_products
 from jaxdamp._types import Scalar
 from jaxdamp.identify.criteria import ROUNDS, SETTLED, Priors, Round
 from jaxdamp.identify.dependence import Dependence, Products
+from jaxdamp.identify.initial_states import DRIFT
 from jaxdamp.identify.noise import CORRELATED, correlation_time
+from jaxdamp.identify.predicting import fit_percent, score
 from jaxdamp.identify.problem import ROUNDING, Problem
-from jaxdamp.identify.search import Searches, searches_of
+from jaxdamp.identify.search import Here, Searches, searches_of
 from jaxdamp.identify.traces import Batch
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.solve import Linearisation, SearchLanes
@@ -126,21 +128,37 @@ def judged(lanes: Lanes, end: SearchLanes, depends: Dependence | None) -> dict[s
         here = lanes.searches[i].here(end.y[i])
         residual, values[i], units[i] = here.whole[:, -1], here.values, here.units
         batches = [part for part in problem.residuals if isinstance(part, Batch)]
-        signals = (np.concatenate([np.ravel(getattr(b, name)) for b in batches]) for name in ("weight", "force"))
-        missed, weight, force = (lanes.of_records(i, signal) for signal in (residual, *signals))
-        errors = [part / root for part, root in zip(missed, weight, strict=True)]
-        by_record.append(np.array([np.sqrt(np.mean(part**2)) for part in errors]))
-        together, measured = np.concatenate(errors), np.concatenate(force)
-        rmse[i], spread = np.sqrt(np.mean(together**2)), np.linalg.norm(measured - measured.mean())
-        percent[i] = 100.0 * (1.0 - np.linalg.norm(together) / spread) if spread > 0 else -np.inf
         noise[i] = (lanes.noise(i, residual, free if depends is None else depends.size / count) / problem.level) ** 2
         periodic = [batch for batch in batches if batch.cycle is not None]
         drift[i] = max(
             [float(_drift(problem.free, jnp.asarray(here.values), batch)) for batch in periodic], default=0.0
         )
+        percent[i], rmse[i], each = _errors(lanes, i, batches, here, settled=drift[i] <= DRIFT)
+        by_record.append(each)
     errors_of_numbers = _standard_errors(end, units, depends, noise)
     named = {"values": values, "standard_errors": errors_of_numbers, "fit_percent": percent, "rmse": rmse}
     return named | {"record_rmse": tuple(by_record), "drift": drift}
+
+
+def _errors(
+    lanes: Lanes, damper: int, batches: Sequence[Batch], here: Here, *, settled: bool
+) -> tuple[float, float, Float[np.ndarray, " records"]]:
+    """Fit percent and RMSE [N] of a damper, and the RMSE [N] of each record, over all samples.
+
+    Where means of samples were fitted, their residuals lack most of the noise, and the samples are predicted, but for
+    a motion in which the states do not become periodic.
+    """
+    problem = lanes.problems[damper]
+    averaged = any(dt * run.sampling_rate > 1.5 for dt, run in zip(problem.sample_steps, problem.runs, strict=True))
+    if averaged and settled:
+        percent, rmse, scores = score(problem.free.build(here.values), problem.runs, None, problem.initial_state)
+        return percent, rmse, np.array([of_record.rmse for of_record in scores])
+    signals = (np.concatenate([np.ravel(getattr(b, name)) for b in batches]) for name in ("weight", "force"))
+    missed, weight, force = (lanes.of_records(damper, signal) for signal in (here.whole[:, -1], *signals))
+    errors = [part / root for part, root in zip(missed, weight, strict=True)]
+    percent = fit_percent(force, [measured - error for measured, error in zip(force, errors, strict=True)])
+    each = np.array([np.mean(np.square(error)) for error in errors])
+    return percent, float(np.sqrt(np.average(each, weights=[error.size for error in errors]))), np.sqrt(each)
 
 
 @compiled_for_loops

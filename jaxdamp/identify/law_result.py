@@ -8,6 +8,7 @@ from typing import overload
 import numpy as np
 from jaxtyping import Float, PyTree
 
+from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
 from jaxdamp._tables import Contents, Table, plain, with_unit
@@ -70,8 +71,8 @@ class AbstractFitted(AbstractResult):
 
     def _model_of(self, runs: Sequence[BenchRun]) -> Model:
         """`model`, with the estimated states at the beginning of those of these records that were fitted."""
-        known = {id(run): start for run, start in zip(self.runs, self.record_starts, strict=False)}
-        starts = [known.get(id(run)) for run in runs] if known else ()
+        known = {run.fingerprint: start for run, start in zip(self.runs, self.record_starts, strict=False)}
+        starts = [known.get(run.fingerprint) for run in runs] if known else ()
         return on_rig(self.law, self.rig, starts)
 
     @overload
@@ -89,6 +90,8 @@ class AbstractFitted(AbstractResult):
             runs: one record, or several for a list of forces.
         """
         records = as_runs(runs)
+        if not records:
+            return []
         forces = predict_by_record(self.models_of(records)[0], records, self.initial_state)[1]
         return forces[0] if isinstance(runs, BenchRun) else forces
 
@@ -101,6 +104,8 @@ class AbstractFitted(AbstractResult):
     def score(self, runs: BenchRun | Iterable[BenchRun]) -> tuple[float, float, tuple[Score, ...]]:
         """Fit percent, RMSE [N] and the scores by record, on records old or new, as `respond` predicts them."""
         runs = as_runs(runs)
+        if not runs:
+            _checks.refuse("runs", "hold at least one record", "empty")
         models, told = self.models_of(runs)
         return score(models, runs, initial_state=self.initial_state, told=told)
 
@@ -151,13 +156,13 @@ class FitResult(AbstractFitted, Fit):
         rigs = self.record_rigs or (None,) * len(self.record_laws)
         starts = [(start,) for start in self.record_starts] or [()] * len(self.record_laws)
         each = map(on_rig, self.record_laws, rigs, starts)
-        own = {id(run): model for run, model in zip(self.runs, each, strict=False)}
-        fitted = {id(run) for run in self.runs}
-        paths = self.own_starts
-        new = [i for i, run in enumerate(runs) if id(run) not in fitted and paths and initial_temperature(run) is None]
+        own = {run.fingerprint: model for run, model in zip(self.runs, each, strict=False)}
+        fitted, paths = {run.fingerprint for run in self.runs}, self.own_starts
+        others = [i for i, run in enumerate(runs) if run.fingerprint not in fitted]
+        new = [i for i in others if paths and initial_temperature(runs[i]) is None]
         if not own and not new:
             return common, told
-        models = [own.get(id(run), of_record(common, i)) for i, run in enumerate(runs)]
+        models = [own.get(run.fingerprint, of_record(common, i)) for i, run in enumerate(runs)]
         for i in new:
             models[i], told[i] = warmed(models[i], runs[i], paths, self.rmse * self.inflation, self.initial_state)
         return models, told

@@ -216,7 +216,7 @@ def _printed_slopes(
     problem = evidence.problem
     free, columns = of_law(problem.free)
     values = np.asarray(evidence.minimum.values)
-    if problem.per_record or not columns.any() or values.dtype != np.float64:
+    if problem.per_record or not columns.any() or problem.free.values.dtype != np.float64:
         return None
     shape = velocity.size, steps + 1
     last = np.zeros(shape)

@@ -14,6 +14,7 @@ from jaxdamp._jacobian import with_jacobian
 from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Contents, Table
+from jaxdamp.identify.criteria import Priors
 from jaxdamp.identify.estimating import at_ends
 from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.propagation import Evidence
@@ -105,10 +106,10 @@ def sensitivity_to_records(
     At the minimum the gradient Jᵀ r of half the sum of squares is zero for all numbers that are not at a bound. By the
     implicit function theorem they change by −H⁻¹ ∂(Jᵀ r)/∂force, where H is the whole matrix of second derivatives.
     """
-    if criterion:
+    problem = evidence.problem
+    if problem.noise_factor != 1.0 or any(isinstance(part, Priors) for part in problem.residuals):
         remedy = "Fit with `loss='squares'` and without priors, whose weights depend on the residual."
         _checks.refuse("result", "be a fit by plain least squares", f"one by {criterion}", remedy)
-    problem = evidence.problem
     minimum = _refined(problem, evidence.minimum.values)
     names, values, slopes = _function(evidence, function, minimum.values)
     scale = 1.0 / np.sqrt(np.diag(minimum.hessian)[minimum.moves])

@@ -251,7 +251,7 @@ def _goals(targets: Mapping[str, Goal], tolerance: float) -> dict[str, tuple[flo
         _checks.refuse("targets", "be numbers by name", _checks.described(targets), "Write {'frequency': 1.2}.")
     goals = {}
     for name, goal in targets.items():
-        value, allowed = goal if isinstance(goal, tuple) else (goal, tolerance * abs(goal))
+        value, allowed = goal if isinstance(goal, Sequence) else (goal, tolerance * abs(goal))
         _checks.finite(f"targets[{name!r}]", value)
         _checks.positive(f"tolerance of targets[{name!r}]", allowed, "Write `(value, tolerance)`.")
         goals[name] = float(value), float(allowed)

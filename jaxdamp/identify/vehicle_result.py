@@ -104,7 +104,7 @@ class VehicleFit(Fit):
         """
         for part in (part for part in self.problem.residuals if isinstance(part, RideBatch)):
             for row, number in enumerate(np.asarray(part.number)):
-                if self.records[number] is record:
+                if self.records[number].fingerprint == record.fingerprint:
                     return dict(
                         zip(part.channels, np.asarray(predicted(part, self.problem.free.tree))[row], strict=True)
                     )

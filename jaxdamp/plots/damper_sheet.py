@@ -326,7 +326,8 @@ def _parameters(axes: Axes, damper: _Damper) -> None:
         for e in damper.fit.parameters:
             shown = display().of(e.unit)
             factor, unit = (1e3, "ms") if e.unit == "s" else (shown.factor, typeset_unit(shown.unit, "–"))
-            value, error = rounded(factor * e.value, factor * 1.96 * e.standard_error)
+            half = max(abs(end - e.value) for end in e.interval)  # the side that no edge of the range cuts
+            value, error = rounded(factor * e.value, factor * half)
             name = _style.path_words(e.name)
             doubtful = bool(e.note)
             text = (

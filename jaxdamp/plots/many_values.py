@@ -17,7 +17,7 @@ _NAMED = 40  # dampers whose names have room
 
 
 def many_fits(result: ManyFits) -> Figure:
-    """The parameters of each damper with their 95 % intervals, and the error of each damper.
+    """The parameters of each damper ± 2 standard errors, and the error of each damper.
 
     Over the setting of the dampers, if it is stated, otherwise in their order. Intervals without an end are left out.
 
@@ -29,7 +29,7 @@ def many_fits(result: ManyFits) -> Figure:
     figure, panels = _panels(len(result.parameters) + 1)
     units = [owner.unit for owner in result.free.owners]
     for number, (axes, name) in enumerate(zip(panels, result.parameters, strict=False)):
-        error = 1.96 * result.standard_errors[:, number]
+        error = 2.0 * result.standard_errors[:, number]
         error = np.where(np.isfinite(error), error, np.nan)
         axes.errorbar(
             places, result.values[:, number], error, fmt="o", color=_style.COLOURS[0], markersize=4, capsize=2
@@ -40,7 +40,7 @@ def many_fits(result: ManyFits) -> Figure:
     if result.settings is None and len(result.names) <= _NAMED:
         for axes in panels:
             axes.set_xticks(places, result.names, rotation=30, ha="right")
-    figure.suptitle(f"{len(result.names)} dampers, with 95 % intervals")
+    figure.suptitle(f"{len(result.names)} dampers, ± 2 standard errors")
     return figure
 
 

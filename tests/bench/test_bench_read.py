@@ -160,6 +160,10 @@ def test_files_of_the_same_name_are_told_apart(write, tmp_path):
         (tmp_path / folder).mkdir()
         write(f"{folder}/run.csv")
     assert read(str(tmp_path / "*" / "run.csv")).names == ("cold/run", "warm/run")
+    for folder in ("cold", "warm"):
+        (tmp_path / folder / "data").mkdir()
+        write(f"{folder}/data/run.csv")
+    assert read(str(tmp_path / "*" / "data" / "run.csv")).names == ("cold/data/run", "warm/data/run")
 
 
 def test_measured_damper(data):

@@ -61,7 +61,7 @@ def test_records_of_one_name_are_named_once():
     runs = [record("20mm_2Hz"), record("20mm_2Hz", 2500.0, seed=1)]
     (sentence,) = contradictions_in_words(contradictions(runs))
     assert ": two records 20mm_2Hz by 17" in sentence
-    assert preflight(runs).named("contradiction")[0].record == "20mm_2Hz"
+    assert preflight(runs).named("contradiction")[0].record == "20mm_2Hz, 20mm_2Hz (2)"
     apart = [replace(run, settings={"clicks": number}) for number, run in enumerate(runs)]
     assert not preflight(apart).named("contradiction")  # what was set explains it
 

@@ -98,6 +98,27 @@ def test_a_manifest_says_how_a_table_is_read(tmp_path):
         bench.read_table(folder)
 
 
+def test_letters_of_types_and_adjusters_are_no_direction(tmp_path):
+    signed = "velocity [m/s],force [N]\n-0.2,-30\n-0.1,-20\n0.1,50\n0.2,70\n"
+    (curve,) = bench.read_table(written(tmp_path, signed, "audi_r8.csv"), sign="rebound-positive").curves
+    np.testing.assert_allclose(curve.force, [-30.0, -20.0, 50.0, 70.0])
+    adjusted = "velocity [m/s],rebound C4 R6 [N],rebound C4 R8 [N],compression [N]\n0.1,50,55,20\n0.2,70,75,30\n"
+    table = bench.read_table(written(tmp_path, adjusted))
+    assert table.settings == ("C4 R6", "C4 R8")
+    assert [curve.force[-1] for curve in table.curves] == [70.0, 75.0]
+    halves = [
+        written(tmp_path, f"velocity [m/s],force [N]\n0.1,{f}\n", f"front_{s}.csv") for s, f in (("r", 50), ("c", 20))
+    ]
+    np.testing.assert_allclose(bench.read_table(halves).curves[0].force, [-20.0, 0.0, 50.0])
+
+
+@pytest.mark.parametrize(("head", "way"), [("rebound [N],reb [N],bump [N]", "rebound"), ("3 clicks,3 clk,4 clk", "")])
+def test_two_columns_for_one_setting_are_refused(tmp_path, head, way):
+    rows = "0.1,50,55,20\n0.2,60,65,30\n" if way else "0.1,50,55,20\n-0.1,-50,-55,-20\n"
+    with pytest.raises(ValueError, match=rf"columns .* and .* both give the force in {way}.*keep one of them"):
+        bench.read_table(written(tmp_path, f"v [m/s],{head}\n{rows}"), units={"force": "N"}, sign="rebound-positive")
+
+
 def test_settings_below_zero_keep_their_sign(tmp_path):
     for head in ("R -2 [N],R 0 [N],R +2 [N],C -2 [N],C 0 [N],C +2 [N]", "R-click -2 [N],R 0,R 2,C -2 clicks,C 0,C 2"):
         text = f"velocity [m/s],{head}\n0.1,100,200,300,50,100,150\n"
@@ -152,6 +173,10 @@ def test_tests_in_one_file_are_split_and_said(tmp_path):
     column = [f"{k},{row}" for k in (7, 8) for row in one]
     numbered = bench.read(written(tmp_path, "\n".join([f"Test No.,{head}", *column]), "numbered.csv"))
     assert numbered.names == ("numbered/test 7", "numbered/test 8")
+    short = [*column[:400], *(f"9,{row}" for row in one[:12]), *column[400:]]
+    spared = bench.read(written(tmp_path, "\n".join([f"Test No.,{head}", *short]), "short.csv"))
+    assert spared.names == ("short/test 7", "short/test 8")
+    assert "test 9 of the file left out: 12 rows, and a record needs 20" in spared[0].notes
     blocks = bench.read(written(tmp_path, "\n".join(["Test 0.5A", head, *one, "Test 1A", head, *one]), "blocks.csv"))
     assert blocks.names == ("blocks/Test 0.5A", "blocks/Test 1A")
     assert [run.settings["current"] for run in blocks] == [0.5, 1.0] and "by its name" in blocks[0].describe()

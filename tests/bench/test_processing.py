@@ -112,6 +112,10 @@ def test_the_mean_cycle():
     assert np.std((mean.force - law)[away]) == pytest.approx(20.0 / np.sqrt(50), rel=0.35)
     assert "mean cycle over" in mean.notes[-1] and "(RMS)" in mean.notes[-1]
     assert BenchSet([run]).process(mean_cycle=True)[0].notes == mean.notes
+    warming = replace(run, temperature=300.0 + run.time / run.time[-1])
+    mean = warming.process(mean_cycle=True)
+    np.testing.assert_allclose(mean.temperature, 300.5, atol=0.05)
+    assert mean.notes[-1].endswith(", at their mean temperature, 27.4 °C")
 
 
 def test_the_order_does_not_matter():

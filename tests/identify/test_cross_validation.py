@@ -2,12 +2,13 @@
 
 import dataclasses
 import json
+import re
 
 import numpy as np
 import pytest
 
 from jaxdamp import identify
-from jaxdamp.bench import SineTest, VirtualDyno
+from jaxdamp.bench import SineTest, VirtualDyno, evaluate, read
 from jaxdamp.dampers import Bilinear, Lag, Linear
 
 
@@ -86,3 +87,62 @@ def test_the_law_for_a_record_is_chosen_without_it(runs):
         identify.cross_validate(laws, runs[:2], nested=True)
     with pytest.raises(ValueError, match="nested=True"):
         _ = identify.cross_validate({"linear": Linear}, runs[:2]).choices
+
+
+def test_records_without_a_group_values_per_record_and_bad_records(runs):
+    commanded = [dataclasses.replace(run, command=1.0) for run in runs[:2]]
+    found = identify.cross_validate({"linear": Linear}, [*commanded, *runs[1:]], by=lambda run: run.command)
+    assert found.groups == (1.0, "None") and len(found.folds) == 4
+    assert found.fit_percent("linear", "None") == pytest.approx(np.mean([f.fit_percent for f in found.folds[2:]]))
+    own = {"rig": "gas", "per_record": ["rig.gas_force"]}
+    first = identify.cross_validate({"linear": Linear}, runs, **own).folds[0]
+    expected = identify.fit(Linear, runs[1:], **own).score([runs[0]])
+    assert (first.fit_percent, first.rmse) == pytest.approx(expected[:2], rel=1e-6)
+    (bad,) = VirtualDyno(Bilinear(2600.0, 1200.0), force_limit=300.0).run([SineTest(0.02, 1.5)])
+    spared = identify.cross_validate({"linear": Linear}, [bad, *runs], bad_records="leave_out")
+    assert [fold.held_out for fold in spared.folds] == [run.name for run in runs]
+    weighed = identify.fit(Linear, [bad, *runs[:2]], bad_records="leave_out", weighting=[3.0, 1.0, 2.0])
+    same = identify.fit(Linear, runs[:2], weighting=[1.0, 2.0])
+    assert weighed["rate"].value == same["rate"].value and weighed.runs == same.runs
+
+
+def test_records_of_one_name_are_told_apart(runs):
+    more = VirtualDyno(Lag(Bilinear(2600.0, 1200.0), 0.004), sampling_rate=400.0, force_noise=10.0, seed=1)
+    again = list(more.run([SineTest(0.01, f, cycles=3) for f in (1.0, 3.0)]))
+    both = [*runs[:2], *again]
+    names = (runs[0].name, runs[1].name, f"{runs[0].name} (2)", f"{runs[1].name} (2)")
+    result = identify.fit(Bilinear, both)
+    assert tuple(score.name for score in result.scores) == names and tuple(r.name for r in result.runs) == names
+    assert result.runs[2].notes[-1] == f"called {names[2]!r}, as another record is called {names[0]!r}"
+    assert again[0].name == names[0]  # the caller's record stays as it is
+    assert result.score(both) == result.score(result.runs)
+    nested = identify.cross_validate({"linear": Linear, "bilinear": Bilinear}, both, nested=True)
+    assert tuple(choice.held_out for choice in nested.choices) == names
+    evaluation = evaluate(both)
+    assert evaluation.cycles[names[0]].force[0, 0] != evaluation.cycles[names[2]].force[0, 0]
+
+
+def test_a_record_that_is_read_again_is_one_of_the_fit(runs, tmp_path):
+    result = identify.fit(Linear, runs, per_record=["rate"])
+    files = [run.to_csv(tmp_path / f"{number}.csv") for number, run in enumerate(runs)]
+    again = read(files)
+    assert result.score(again)[1] == pytest.approx(result.rmse, rel=1e-12)
+    other = dataclasses.replace(runs[0], force=1.1 * runs[0].force)
+    mean = float(result.law.rate)  # of a record that is new
+    np.testing.assert_allclose(result.respond(other), mean * other.velocity, atol=1e-6)
+    own = float(result.record_laws[0].rate)
+    np.testing.assert_allclose(result.respond(again[0]), own * runs[0].velocity, atol=1e-6)
+    assert abs(mean / own - 1.0) > 1e-3
+    assert result.respond([]) == []
+    with pytest.raises(ValueError, match="`runs` must hold at least one record, but is empty"):
+        result.score([])
+
+
+def test_several_commands_that_a_law_does_not_follow_are_said(runs):
+    soft = VirtualDyno(Bilinear(1500.0, 700.0), sampling_rate=400.0, force_noise=10.0).run([SineTest(0.02, 2.0)])
+    apart = [dataclasses.replace(run, command=float(i > 0)) for i, run in enumerate([runs[0], *soft])]
+    said = r"several commands \(0 to 1\), which this law does not follow"
+    assert any(re.search(said, text) for text in identify.fit(Bilinear, apart).warnings)
+    own = identify.fit(Bilinear, apart, per_record=["rebound_rate", "compression_rate"])
+    assert not any(re.search(said, text) for text in own.warnings)
+    assert not any(re.search(said, text) for text in identify.fit(Bilinear, apart[1:]).warnings)

@@ -73,6 +73,16 @@ def test_records_cut_out_of_a_long_motion_start_in_the_periodic_solution():
     assert drifting.remarks[1] == "its states are not periodic: over a cycle they still change by 0.01"
 
 
+@pytest.mark.parametrize("start", [Bilinear, Lag(Bilinear(1500.0, 1500.0), 2e-3)], ids=["memoryless", "with a state"])
+def test_errors_are_those_of_the_samples_where_their_means_are_fitted(start):
+    dyno = VirtualDyno(Bilinear(2400.0, 1200.0), force_noise=20.0, sampling_rate=4000.0)
+    slow = list(dyno.run([SineTest(0.02, 0.5, cycles=2), SineTest(0.02, 1.0, cycles=2)]))
+    many, single = fit_many(start, {"a": slow}), fit(start, slow, starts=1)
+    assert many.rmse[0] == pytest.approx(20.0, rel=0.05) and many.rmse[0] == pytest.approx(single.rmse, rel=1e-6)
+    np.testing.assert_allclose(many.record_rmse[0], [score.rmse for score in single.scores], rtol=1e-6)
+    assert many.fit_percent[0] == pytest.approx(single.fit_percent, rel=1e-6)
+
+
 def test_records_of_three_lengths_are_computed_in_two_loops():
     rows = [Row(1e-3, [], np.ones(size), 0, 0, 1, 1) for size in (2000, 700, 200) for _ in range(10)]
     assert sorted(len(group) for group in _grouped(rows)) == [10, 20]

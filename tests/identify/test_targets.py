@@ -74,6 +74,11 @@ def test_metrics_of_a_ride_beyond_reach_are_named_with_the_bound_that_limits_the
     assert result["damper.rate"] == alone["damper.rate"]
 
 
+def test_a_target_with_its_tolerance_is_a_tuple_or_a_list():
+    ends = [identify.fit_targets(lambda p: {"a": p["a"]}, {"a": 1.0}, {"a": goal}) for goal in ((3.0, 0.1), [3.0, 0.1])]
+    assert ends[0]["a"] == ends[1]["a"] and ends[0].targets == ends[1].targets
+
+
 def test_fewer_targets_than_numbers_move_what_they_must_and_say_so():
     result = identify.fit_targets(lambda p: {"sum": p["a"] + p["b"]}, {"a": 1.0, "b": 2.0}, {"sum": 6.0})
     assert result.targets[0].met
