@@ -12,6 +12,7 @@ from jaxtyping import Array, Float, PyTree
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Table
+from jaxdamp.dampers import margins
 from jaxdamp.identify.propagation import Evidence, Propagated, over_samples
 from jaxdamp.parameters import Coordinates
 
@@ -50,7 +51,8 @@ class Posterior(AbstractResult):
 
     Attributes:
         evidence: the fit.
-        samples: in the units of the parameters, shape (samples, free).
+        samples: in the units of the parameters, of all chains, without those that break a condition of the law, shape
+            (samples, free).
         parameters: mean, standard deviation and interval of each free number, with the agreement of the chains.
         divergences: steps of the sampler that went wrong; more than a few mean that corners of the posterior are
             missing.
@@ -117,8 +119,13 @@ def posterior(evidence: Evidence, samples: int, warm_up: int, chains: int, seed:
         sampler.run(jax.random.key(seed), init_params=jnp.asarray(begin), extra_fields=("diverging",))
     drawn = np.asarray(jax.vmap(jax.vmap(physical))(sampler.get_samples(group_by_chain=True)), float)
     free, flat = evidence.problem.free, drawn.reshape(-1, drawn.shape[-1])
+    # The prior is zero where a condition of the law does not hold: the samples beyond are none of the posterior.
+    holds = np.asarray(jax.vmap(lambda values: jnp.all(margins(free.build(values)) > 0.0))(jnp.asarray(flat)))
+    flat = flat[holds]
+    if len(flat) < 2:
+        _checks.refuse("samples", "be more: of these, nearly all break a condition of the law", samples)
     low, high = np.quantile(flat, [0.025, 0.975], axis=0)
-    checks = (split_gelman_rubin(drawn), effective_sample_size(drawn))
+    checks = (split_gelman_rubin(drawn), np.mean(holds) * effective_sample_size(drawn))
     measures = (flat.mean(axis=0), flat.std(axis=0, ddof=1), low, high, *checks)
     rows = [
         Spread(name, p.unit, mean, std, (below, above), r_hat, count)
@@ -132,9 +139,9 @@ def posterior(evidence: Evidence, samples: int, warm_up: int, chains: int, seed:
 def _potential(evidence: Evidence) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
     """Minus the logarithm of the posterior in coordinates without correlation, and their conversion to physical values.
 
-    The prior is flat in the physical values, within their domains. With the level of the noise unknown and ν degrees of
-    freedom, the likelihood is (1 + χ²/ν)^(−(ν + p)/2), χ² being the increase over the minimum; for a linear law that is
-    Student's distribution with the covariance of the fit.
+    The prior is flat in the physical values, within their domains; conditions between them do not count here. With the
+    level of the noise unknown and ν degrees of freedom, the likelihood is (1 + χ²/ν)^(−(ν + p)/2), χ² being the
+    increase over the minimum; for a linear law that is Student's distribution with the covariance of the fit.
     """
     problem, noise, centre = evidence.problem, evidence.noise, evidence.minimum.values
     if not np.all(np.isfinite(evidence.covariance)):

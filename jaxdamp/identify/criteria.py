@@ -162,7 +162,7 @@ def solve_by(
         best = solution.best
         if not best.finite or problem.is_rounding(best.squares):
             break
-        level = float(np.mean(noise(now.problem, best).sigma[problem.used]))
+        level = float(np.sqrt(noise(now.problem, best).variance))
         after = now.after(problem, best.residual, level, loss, spread)
         if after is None:
             break

@@ -59,8 +59,8 @@ class Noise(NamedTuple):
         return total
 
     def scaled(self, factor: float, used: Bool[np.ndarray, " samples"]) -> "Noise":
-        """The same a factor larger, with the mean level for residuals that are not used: priors."""
-        sigma = factor * np.where(used, self.sigma, np.mean(self.sigma[used]))
+        """The same a factor larger; residuals that are not used, priors, have the level of a sample with its memory."""
+        sigma = factor * np.where(used, self.sigma, np.sqrt(self.variance))
         return self._replace(sigma=sigma, variance=factor**2 * self.variance)
 
 
@@ -77,7 +77,7 @@ def independent(sigma: Float[np.ndarray, " samples"], used: Bool[np.ndarray, " s
 
 
 def noise_of(problem: Problem, found: SearchEnd, force_noise: float | None) -> Noise:
-    """The noise of all residuals; that of records as `_noise_of_records`, that of priors at its mean level."""
+    """The noise of all residuals; that of records as `_noise_of_records`, that of priors at its level."""
     factor = 1.0 if force_noise is not None else float(problem.noise_factor)
     return _noise_of_records(problem, found, force_noise).scaled(factor, problem.used)
 
@@ -117,7 +117,7 @@ def _noise_of_records(problem: Problem, found: SearchEnd, force_noise: float | N
         few = white._replace(dof=max(count / counted - found.values.size, 1.0), inflation=float(np.sqrt(counted)))
         return few._replace(systematic=True).with_sigma(np.sqrt(counted) * level)
     noise = Noise(_levels(found.residual, records, True), records, tuple(correlations), 0.0, 1.0)
-    return _corrected(noise, orthonormal(found.jacobian))
+    return _corrected(noise, orthonormal(np.where(used[:, None], found.jacobian, 0.0)))
 
 
 def channel_noise(problem: Problem, residual: Float[np.ndarray, " samples"], free: int) -> Noise:

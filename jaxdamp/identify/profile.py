@@ -34,6 +34,8 @@ MOST_POINTS = 24  # on each side
 FAR = 1e3  # relative to the value or to the standard error, beyond which a side counts as open
 CLOSE = 1e-2  # of the root of the cost at an end of the interval
 MOST_SECANTS = 12  # to find an end
+MOST_MOVES = 10  # of all other numbers, to where conditions between them hold
+OVERSHOOT, ROOM = 1.2, 1e-6  # of what is lacking, and beside it in coordinates of the search
 LEAST_SHARE = 0.05  # of the bracket, by which a secant stays away from its ends
 
 
@@ -89,10 +91,33 @@ def moved_to(
     problem, values = searches.problem, end.values.copy()
     values[index] = value
     lower, upper = problem.free.limits()
-    inside = lower[index] < value < upper[index]
-    if not inside or (problem.has_conditions and not keeps_conditions(problem.started_at(values).free.tree)):
+    if not lower[index] < value < upper[index]:
         return None
+    if problem.has_conditions and not keeps_conditions(problem.started_at(values).free.tree):
+        within = _within_conditions(searches, values, index)
+        if within is None:
+            return None
+        values = within
     return searches.end(values, steps, held=index, solver=solver)
+
+
+def _within_conditions(
+    searches: Searches, values: Float[np.ndarray, " free"], index: int
+) -> Float[np.ndarray, " free"] | None:
+    """The values with all but one moved, as little as it takes, to where the conditions hold; None if none is found."""
+    lower, upper = searches.coordinates.bounds()
+    y = np.asarray(searches.coordinates.from_physical(values), np.float64)
+    others = np.arange(y.size) != index
+    for _ in range(MOST_MOVES):
+        here = searches.here(y)
+        wrong = here.margins <= 0.0
+        if not np.any(wrong):
+            return here.values
+        slopes = here.slopes[wrong][:, others]
+        lacking = OVERSHOOT * -here.margins[wrong] + ROOM * np.linalg.norm(slopes, axis=1)
+        y[others] += np.linalg.lstsq(slopes, lacking, rcond=None)[0]
+        y[others] = np.clip(y, lower, upper)[others]
+    return None
 
 
 @dataclasses.dataclass(frozen=True, repr=False)

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from jaxdamp.dampers import Bilinear, Linear, Saturating
+from jaxdamp.bench import SineTest, VirtualDyno
+from jaxdamp.dampers import Besinger, Bilinear, Linear, Saturating
+from jaxdamp.dampers.besinger import least_rebound
 from jaxdamp.identify import fit
 
 
@@ -66,6 +68,18 @@ def test_priors_losses_and_the_machine_count_as_in_a_linear_fit(sines):
         row = drawn[estimate.name]
         assert row.mean == pytest.approx(estimate.value, abs=0.15 * estimate.standard_error)
         assert row.standard_deviation == pytest.approx(estimate.standard_error, rel=0.1)
+
+
+@pytest.mark.slow
+def test_no_sample_breaks_a_condition_of_the_law():
+    pytest.importorskip("numpyro")
+    law = Besinger(4000.0, 900.0, 400.0, limit_velocity=0.3, transition_velocity=0.02)
+    runs = VirtualDyno(law, force_noise=400.0, sampling_rate=500.0).run([SineTest(0.02, 2.0)])
+    result = fit(law, runs, starts=1, freeze=["limit_velocity", "transition_velocity", "blow_off_rate"])
+    drawn = result.posterior(samples=300, warm_up=300, seed=1).samples
+    share = float(least_rebound(law.limit_velocity, law.transition_velocity))
+    assert len(drawn) > 150 and np.all(drawn[:, 1] > share * drawn[:, 0])
+    assert np.min(drawn[:, 1] / drawn[:, 0]) < 1.02 * share  # up to the condition
 
 
 @pytest.mark.exhaustive

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import Besinger, Bilinear, Linear
@@ -52,6 +53,23 @@ def test_a_prior_is_weighed_against_the_records(sines):
     assert result.criterion.startswith("priors rate 15")
     estimated = fit(Linear(1000.0), runs, priors={"rate": (mean, error)})  # with the noise that the residual shows
     assert estimated["rate"].value == pytest.approx(result["rate"].value, abs=0.1 * error)
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.95])
+@pytest.mark.parametrize("deviation", [10.0, 100.0])
+def test_a_prior_is_weighed_against_noise_with_a_memory(sines, memory, deviation):
+    """As the mean of two estimates, weighted by their standard errors: once noise with a memory counted as white."""
+    rng = np.random.default_rng(1)
+    runs = [
+        dataclasses.replace(run, force=run.force + lfilter([10.0], [1.0, -memory], rng.standard_normal(len(run))))
+        for run in sines(TRUTH)
+    ]
+    alone = fit(Bilinear, runs)["rebound_rate"]
+    both = fit(Bilinear, runs, priors={"rebound_rate": (2620.0, deviation)})["rebound_rate"]
+    weights = np.array([alone.standard_error, deviation]) ** -2.0
+    error = np.sum(weights) ** -0.5
+    assert both.standard_error == pytest.approx(error, rel=0.1)
+    assert both.value == pytest.approx(np.average([alone.value, 2620.0], weights=weights), abs=0.2 * error)
 
 
 def test_a_prior_determines_what_the_records_do_not(sines):

@@ -9,7 +9,9 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 
 from jaxdamp import Ride, plots, roads, vehicles
-from jaxdamp.dampers import Bilinear, Linear, Saturating, SeriesSpring, Table
+from jaxdamp.bench import SineTest, VirtualDyno
+from jaxdamp.dampers import Besinger, Bilinear, Linear, Saturating, SeriesSpring, Table
+from jaxdamp.dampers.besinger import least_rebound
 from jaxdamp.identify import FitResult, fit, propagation
 from jaxdamp.rig import Rig
 
@@ -134,6 +136,29 @@ def test_the_profile_of_a_banana(curved):
     for end in curve.interval:
         other = minimize_scalar(squares, bounds=(500.0, 5000.0), args=(end,), method="bounded", options={"xatol": 1e-6})
         assert (other.fun - least) / variance == pytest.approx(curve.level, rel=0.03)
+
+
+def test_a_profile_goes_on_along_a_condition_of_the_law():
+    """At a minimum on the condition between two rates, one can only move if the other follows it."""
+    law = Besinger(4000.0, 900.0, 400.0, limit_velocity=0.3, transition_velocity=0.02)
+    runs = VirtualDyno(law, force_noise=400.0, sampling_rate=500.0).run([SineTest(0.02, 2.0)])
+    held = ["limit_velocity", "transition_velocity", "blow_off_rate"]
+    result = fit(law, runs, starts=1, freeze=held)
+    compression, curve = result["compression_rate"], result.profile("compression_rate")
+    low, high = curve.interval
+    assert low < compression.value < 4000.0 < high  # where the interval once ended at the value
+    share, v = float(least_rebound(law.limit_velocity, law.transition_velocity)), runs[0].velocity
+    ones, *twice = (Besinger(*rates, 0.3, 0.02).force_velocity(v) for rates in 1.0 + np.eye(4, 3, -1))
+    unit = [np.asarray(other - ones) for other in twice]
+    left = runs[0].force - 400.0 * unit[2]
+
+    def squares(rate: float) -> float:
+        """The least by the other rate, of which the force is linear, where the condition holds."""
+        other = max(float(unit[1] @ (left - rate * unit[0]) / (unit[1] @ unit[1])), share * rate)
+        return float(np.sum((left - rate * unit[0] - other * unit[1]) ** 2))
+
+    rises = np.array([squares(rate) for rate in curve.values]) - squares(compression.value)
+    np.testing.assert_allclose(curve.cost, rises / result.rmse**2, rtol=0.02, atol=0.02)
 
 
 @pytest.mark.parametrize("rig", [None, "offset"])
