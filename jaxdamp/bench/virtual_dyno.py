@@ -22,7 +22,7 @@ from jaxdamp.bench.velocity import estimate_velocity
 from jaxdamp.bench.waveforms import CommandedExcitation
 from jaxdamp.dampers import AbstractDamper, Heated, check_commands, require_finite_force
 from jaxdamp.parameters import modules_inside, parameters
-from jaxdamp.rig import Rig
+from jaxdamp.rig import PRINTED, PrintedRecord, Rig, numbers_on_rig, printed_forces
 
 
 Channels = Float[np.ndarray, "tests time"]
@@ -241,8 +241,25 @@ def _exact_readings(
     """`Rig.readings` for several tests, in float64 whatever the session's precision: its steps are microseconds."""
     with jax.enable_x64(True):
         law_64, rig_64 = jax.tree.map(lambda a: a.astype(np.float64) if eqx.is_inexact_array(a) else a, (law, rig))
-        channels = jax.tree.map(jax.numpy.asarray, (time, stroke + float(rig_64.stroke_offset), velocity, command))
-        readings = jax.vmap(lambda t, x, v, u: rig_64.readings(law_64, t, x, v, command=u))(*channels)
-        force, temperature = map(np.asarray, readings)
+        stroke = stroke + float(rig_64.stroke_offset)
+        printed = _printed(law_64, rig_64, time, stroke, velocity) if command is None else None
+        if printed is None:
+            channels = jax.tree.map(jax.numpy.asarray, (time, stroke, velocity, command))
+            readings = jax.vmap(lambda t, x, v, u: rig_64.readings(law_64, t, x, v, command=u))(*channels)
+            force, temperature = map(np.asarray, readings)
+        else:
+            force, temperature = printed, np.full(time.shape, float(rig_64.reference_temperature))
     require_finite_force(law, force, "over the whole programme")
     return force, temperature
+
+
+def _printed(law: AbstractDamper, rig: Rig, time: Channels, stroke: Channels, velocity: Channels) -> Channels | None:
+    """The force by printed C, where the steps of the states take the time; None where XLA computes it."""
+    effects = rig.effects()
+    if law.initial_state().size == 0 or not set(effects) <= set(PRINTED):
+        return None
+    steps, one, none = np.diff(time[:, :2])[:, 0], np.ones(time.shape[1]), np.zeros(time.shape[1])
+    motions = zip(steps.tolist(), stroke, velocity, strict=True)
+    rows = [PrintedRecord(dt, x, v, one, none, 1, effects) for dt, x, v in motions]
+    forces = printed_forces([numbers_on_rig(law, rig)] * len(rows), rows)
+    return None if forces is None else np.stack(forces)

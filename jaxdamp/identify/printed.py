@@ -23,13 +23,13 @@ from jaxdamp.parameters import FreeParameters, get, with_values
 from jaxdamp.rig import (
     PRINTED,
     LawNumbers,
-    MachinePlaces,
     PrintedLaw,
     PrintedRecord,
     Rig,
     is_number,
     numbers_on_rig,
     plain_rig,
+    printed_forces,
     printed_law,
     say,
 )
@@ -62,15 +62,8 @@ def predicted(batch: Batch, model: Model) -> Float[np.ndarray, "runs time"] | No
     """Forces [N] of a model in records; None where XLA computes them."""
     if _refusal([batch], model):
         return None
-    numbers = _numbers_of(batch, model)
-    law = printed_law(numbers[0], None)
-    if law is None:
-        return None
-    forces, none = [], MachinePlaces(-1, -1, -1)
-    for p, row in zip((own.flat for own in numbers), rows_of(batch), strict=True):
-        record = row.on_machine(law.machine(p).delay)
-        forces.append(row.shown(law.forces(p, record)[:, None], record, law.machine(p), none)[:, 0])
-    return np.stack(forces)
+    forces = printed_forces(_numbers_of(batch, model), rows_of(batch))
+    return None if forces is None else np.stack(forces)
 
 
 def rows_of(batch: Batch) -> list[PrintedRecord]:

@@ -10,6 +10,7 @@ from jaxdamp.rig.printed import (
     WithPrinted as WithPrinted,
     numbers_on_rig as numbers_on_rig,
     plain_rig as plain_rig,
+    printed_forces as printed_forces,
     printed_law as printed_law,
     remember as remember,
     say as say,

@@ -16,7 +16,7 @@ from jaxdamp.codegen import Constant, Signature, Symbols, library, symbols, with
 from jaxdamp.dampers import AbstractDamper, laws_inside, margins
 from jaxdamp.rig.law_numbers import LawNumbers, numbers_of
 from jaxdamp.rig.machine import Rig, gas_and_friction
-from jaxdamp.rig.printed_records import MachineNumbers, MachinePlaces, Record
+from jaxdamp.rig.printed_records import MachineNumbers, MachinePlaces, PrintedRecord, Record
 
 
 T = TypeVar("T")
@@ -277,6 +277,25 @@ def printed_law(numbers: LawNumbers, free: set[int] | None) -> PrintedLaw | None
         with _LOCK:
             _laws.setdefault(numbers.key, []).append(law)
         return law
+
+
+def printed_forces(
+    numbers: Sequence[LawNumbers], rows: Sequence[PrintedRecord]
+) -> list[Float[np.ndarray, " time"]] | None:
+    """What the force channel shows [N] in each record; None where the law cannot be printed.
+
+    Arguments:
+        numbers: of the law on its machine in each record, all of one structure.
+        rows: the records.
+    """
+    law = printed_law(numbers[0], None)
+    if law is None:
+        return None
+    forces, none = [], MachinePlaces(-1, -1, -1)
+    for p, row in zip((own.flat for own in numbers), rows, strict=True):
+        record = row.on_machine(law.machine(p).delay)
+        forces.append(row.shown(law.forces(p, record)[:, None], record, law.machine(p), none)[:, 0])
+    return forces
 
 
 @dataclasses.dataclass(frozen=True)

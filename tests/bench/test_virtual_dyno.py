@@ -4,7 +4,7 @@ import jax
 import numpy as np
 import pytest
 
-from jaxdamp.bench import RandomTest, Sensors, SineTest, VirtualDyno, programmes, read
+from jaxdamp.bench import RandomTest, Sensors, SineTest, VirtualDyno, programmes, read, virtual_dyno
 from jaxdamp.dampers import Bilinear, Heated, Lag, Linear, SeriesSpring
 from jaxdamp.rig import Rig
 
@@ -33,6 +33,18 @@ def test_law_with_state_is_steady_and_exact(frequency, rate):
         run = VirtualDyno(law, sampling_rate=rate).run(test)[0]
         truth = np.imag(0.0025 * gain * np.exp(1j * omega * run.time))
         assert np.max(np.abs(run.force - truth)) < 1e-5 * np.max(np.abs(truth))
+
+
+@pytest.mark.parametrize("law", [Lag(Bilinear(2600.0, 1200.0), 4e-3), SeriesSpring(Linear(2000.0), 1e6)])
+def test_printed_laws_give_the_records_of_xla(law, monkeypatch):
+    machine = {"gas_force": -80.0, "gas_stiffness": 900.0, "friction": 15.0, "moving_mass": 2.0, "force_offset": 12.0}
+    rig = Rig(**machine, stroke_offset=3e-3, force_delay=2e-3, force_lag=1e-3)
+    dyno, tests = VirtualDyno(law, rig=rig, temperature_channel=True), [TEST, SineTest(0.02, 1.0, cycles=1)]
+    printed = dyno.run(tests)
+    monkeypatch.setattr(virtual_dyno, "printed_forces", lambda *_: None)
+    for one, other in zip(printed, dyno.run(tests), strict=True):
+        np.testing.assert_allclose(one.force, other.force, rtol=0.0, atol=1e-9 * np.max(np.abs(other.force)))
+        np.testing.assert_array_equal(one.temperature, other.temperature)
 
 
 def test_precision_does_not_depend_on_the_session():
