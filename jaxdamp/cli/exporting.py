@@ -170,8 +170,8 @@ def _grid(law: AbstractDamper, text: str | None) -> np.ndarray:
         fitted = None if law.fitted_to is None else law.fitted_to.velocity
         low, high = fitted or _USUAL
         grid = np.linspace(low, high, _POINTS)
-        if low < 0 < high:
-            grid[np.argmin(np.abs(grid))] = 0.0  # where many laws have a kink
+        if low < 0 < high:  # where many laws have a kink
+            grid[1 + np.argmin(np.abs(grid[1:-1]))] = 0.0
         return grid
     try:
         low, high, points = text.split(":")

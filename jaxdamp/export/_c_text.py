@@ -76,7 +76,7 @@ class CSource(NamedTuple):
     about: list[str]  # lines of the comment above the header
     dtype: str  # the type of all numbers
     numbers: list[LawNumber]  # the members of the struct
-    constants: list[tuple[str, int, str]]  # names of whole numbers with their values, and comments
+    constants: list[tuple[str, float, str]]  # names of numbers with their values, and comments
     functions: list[CFunction]  # all functions but that which sets the numbers
 
     def header(self) -> str:
@@ -213,6 +213,7 @@ def vehicle_source(program: VehicleProgram, name: str, derivatives: bool = False
         f"m holds {upper}_MATRICES numbers, set by {name}_prepare; c holds {upper}_CARRY, set by {name}_start.",
         f"The first {upper}_STATES numbers of c are the states x: {', '.join(name for name, _ in program.states)}.",
         f"y holds {upper}_OUTPUTS channels.",
+        f"Steps longer than {upper}_LONGEST_STEP are too long for laws as steep as these: `simulate` divides them.",
     ]
     if isinstance(program, ControlledProgram):
         about += _about_instants(program, f"{name}_step", "Behind them c holds where the controller is.")
@@ -250,15 +251,16 @@ def _about_instants(program: ControlledProgram | ControllerProgram, step: str, *
     return [*lines, f"At every {step} the sensors are read, and where a period ends a command is decided: {whole}."]
 
 
-def _constants(program: VehicleProgram, prefix: str) -> list[tuple[str, int, str]]:
-    """Lengths of the arrays, and the number of each channel."""
+def _constants(program: VehicleProgram, prefix: str) -> list[tuple[str, float, str]]:
+    """Lengths of the arrays, the longest step, and the number of each channel."""
     sizes = [("WHEELS", program.wheels), ("STATES", len(program.states)), ("OUTPUTS", len(program.channels))]
     sizes += [("MATRICES", program.sizes["m"]), ("CARRY", program.sizes["c"])]
-    constants = [(f"{prefix}_{key}", value, "") for key, value in sizes]
+    constants: list[tuple[str, float, str]] = [(f"{prefix}_{key}", value, "") for key, value in sizes]
+    constants.append((f"{prefix}_LONGEST_STEP", program.longest_step, "s, of laws as they are exported"))
     return constants + _numbered(f"{prefix}_Y", program.channels)
 
 
-def _numbered(prefix: str, lines: Sequence[Channel] | Sequence[Line]) -> list[tuple[str, int, str]]:
+def _numbered(prefix: str, lines: Sequence[Channel] | Sequence[Line]) -> list[tuple[str, float, str]]:
     """The number of each entry of an array."""
     return [
         (f"{prefix}_{identifier(line.name).upper()}", k, f"[{line.unit or '-'}] {line.description}")

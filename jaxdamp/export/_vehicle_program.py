@@ -15,10 +15,11 @@ from jaxtyping import Array, PyTree
 from jaxdamp._vectors import MemoryLayout, scalars
 from jaxdamp.codegen import Constant, Program, Symbols, Variable, lower, printing, symbols
 from jaxdamp.export._law_program import AbstractProgram
-from jaxdamp.simulation import Equations, Exponential, RoadInput, settled
+from jaxdamp.simulation import Equations, Exponential, RoadInput, settled, substeps_needed
 from jaxdamp.vehicles import AbstractVehicle, Channel, ChannelKind
 
 
+LONGEST_STEP = 1e-3  # s
 Numbers: TypeAlias = PyTree[Array]  # of a vehicle, in the order of `PreparedProgram.numbers`
 
 
@@ -77,6 +78,11 @@ class PreparedProgram(AbstractProgram):
     @abstractmethod
     def _inputs(self) -> list[Symbols]:
         """What is given at an instant."""
+
+    @cached_property
+    def longest_step(self) -> float:
+        """The longest step [s] that keeps every law stable, at most 1 ms."""
+        return LONGEST_STEP / substeps_needed(self.vehicle, LONGEST_STEP)
 
     @property
     def sizes(self) -> dict[str, int]:

@@ -20,7 +20,7 @@ from jaxdamp.export._law_program import LawProgram, identifier
 from jaxdamp.export._vehicle_program import VehicleProgram
 from jaxdamp.rig import respond
 from jaxdamp.roads import from_profile
-from jaxdamp.simulation import simulate, substeps_needed
+from jaxdamp.simulation import simulate
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -76,7 +76,7 @@ int main(void) {{
 
 def vehicle_test(program: VehicleProgram, name: str) -> str:
     """The text of the program for a vehicle; it returns zero if the differences of all channels are due to rounding."""
-    step = _STEP / substeps_needed(program.vehicle, _STEP)
+    step = program.longest_step
     time = np.arange(_INSTANTS) * step
     # heights under the wheels [m], shape (time, wheels), which begin at zero and differ from wheel to wheel
     angle, phase = 2.0 * np.pi * time[:, None], 0.4 * np.arange(program.wheels)
@@ -137,7 +137,7 @@ def sample_signals(program: ControllerProgram, step: float) -> np.ndarray:
 def controller_test(program: ControllerProgram, name: str) -> str:
     """The text of the program for a controller; it returns zero if commands and demands differ by rounding."""
     period = program.vehicle.period
-    step = period / math.ceil(period * substeps_needed(program.vehicle, _STEP) / _STEP * (1.0 - 1e-9))
+    step = period / math.ceil(period / program.longest_step * (1.0 - 1e-9))
     given = sample_signals(program, step)
     computed = program.run(jnp.asarray(given), step)
     expected = np.asarray(computed, float)
@@ -245,10 +245,14 @@ def to_c(
         source, test = controller_source(program, name), controller_test(program, name)
     else:
         source, test = vehicle_source(program, name, derivatives), vehicle_test(program, name)
+    tests, begin = file.with_name(f"{name}_test.c"), test.partition(name)[0]  # as all test programs begin
+    if tests.exists() and not tests.read_text(encoding="utf-8", errors="replace").startswith(begin):
+        remedy = "Move that file, or take another name."
+        _checks.refuse("path", f"leave room for its test program, {tests.name}", f"{file.name}, beside it", remedy)
     texts = {
         file.with_suffix(".h"): source.header(),
         file: f'#include "{name}.h"\n\n{INCLUDES}\n{source.definitions()}',
-        file.with_name(f"{name}_test.c"): test,
+        tests: test,
     }
     return [write_whole(file, text) for file, text in texts.items()]
 

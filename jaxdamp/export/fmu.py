@@ -26,8 +26,7 @@ from jaxdamp.export._c_text import controller_source, law_source, vehicle_source
 from jaxdamp.export._controlled_program import ControlledProgram
 from jaxdamp.export._controller_program import ControllerProgram, program_of
 from jaxdamp.export._law_program import LawNumber, LawProgram, identifier
-from jaxdamp.export._vehicle_program import VehicleProgram
-from jaxdamp.simulation import substeps_needed
+from jaxdamp.export._vehicle_program import LONGEST_STEP, PreparedProgram, VehicleProgram
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -144,7 +143,7 @@ def description(program: AnyProgram, known: list[Variable], name: str, guid: str
     for kind, more in list(kinds.items())[sampled:]:
         files = ET.SubElement(ET.SubElement(root, kind, {"modelIdentifier": name} | can | more), "SourceFiles")
         ET.SubElement(files, "File", {"name": f"{name}.c"})
-    step = program.vehicle.period if isinstance(program, ControllerProgram) else _LONGEST_STEP
+    step = program.vehicle.period if isinstance(program, ControllerProgram) else LONGEST_STEP
     _units(ET.SubElement(root, "UnitDefinitions"), {variable.unit for variable in known} - {""})
     ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize=repr(step))
     listed = ET.SubElement(root, "ModelVariables")
@@ -190,7 +189,6 @@ def _units(definitions: ET.Element, units: set[str]) -> None:
 
 _PLATFORMS = {"linux": ("linux", "so"), "darwin": ("darwin", "dylib"), "win32": ("win", "dll")}
 _TEXTS = Path(__file__).parent / "fmi2"
-_LONGEST_STEP = 1e-3  # s
 _WHEN = (2000, 1, 1, 0, 0, 0)  # of all files in the archive: the same model gives the same file
 
 
@@ -244,9 +242,7 @@ def to_fmu(
         must = "be a file NAME.fmu whose name is an identifier of C"
         _checks.refuse("path", must, str(file), f"Try {identifier(name) + '.fmu'!r}.")
     program = program_of(law, part)
-    longest = _LONGEST_STEP
-    if isinstance(law, AbstractVehicle):
-        longest /= substeps_needed(law, _LONGEST_STEP)
+    longest = program.longest_step if isinstance(program, PreparedProgram) else LONGEST_STEP
     listed, (code, text) = variables(program, longest), _printed(program)
     texts = [text, *((_TEXTS / file).read_text(encoding="utf-8") for file in (code, "unit.c", "services.c"))]
     guid = hashlib.sha256(repr((texts, listed)).encode()).hexdigest()[:32]

@@ -270,7 +270,7 @@ def to_assetto_corsa(
         speed, force = sign * table.velocity[inside], sign * table.force[inside]
         if speed.size < 3:
             must = f"hold three velocities or more in {'compression' if sign < 0 else 'rebound'}"
-            _checks.refuse("velocities", must, table.velocity)
+            _checks.refuse("velocities", must, table.velocity, table.left_out)
         side = _two_lines(speed, force)
         misfit = np.sqrt(np.mean((side.force(speed) - force) ** 2) / np.mean(force**2))
         lines += [

@@ -50,6 +50,10 @@ def test_velocities(law: Path) -> None:
     to_json(with_fitted_range(LAW, FittedRange(velocity=(-0.2, 0.3))), fitted)
     assert " from -0.2 to 0.3 m/s" in jaxdamp("export", fitted, "--to", "adams").output
     assert "\n      0.000000        0.000000\n" in (law.parent / "fitted.dpr").read_text()
+    to_json(with_fitted_range(LAW, FittedRange(velocity=(-0.01, 1.2))), fitted)
+    assert " from -0.01 to 1.2 m/s" in jaxdamp("export", fitted, "--to", "csv", "--replace").output
+    first, second = np.loadtxt(law.parent / "fitted.csv", delimiter=",", comments=("#", "v"))[:2]
+    np.testing.assert_allclose((first, second), [(-0.01, -12.0), (0.0, 0.0)], atol=1e-9)
 
 
 def test_a_table_in_the_units_and_the_sign_of_a_shop(law: Path) -> None:

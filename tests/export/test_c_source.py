@@ -6,10 +6,21 @@ import numpy as np
 import pytest
 
 from jaxdamp._types import Number
-from jaxdamp.dampers import AbstractMemoryless, Besinger, BoucWen, GasSpring, Lag, Linear, PiecewiseLinear
+from jaxdamp.dampers import (
+    AbstractMemoryless,
+    Besinger,
+    BoucWen,
+    CoulombFriction,
+    GasSpring,
+    Lag,
+    Linear,
+    PiecewiseLinear,
+)
 from jaxdamp.export import to_c
 from jaxdamp.export._law_program import identifier
 from jaxdamp.parameters import parameter
+from jaxdamp.simulation import substeps_needed
+from jaxdamp.vehicles.presets import quarter_car_000
 from tests.dampers.test_contract import LAWS
 from tests.export.compiled import STRICT, compiled, compiler, in_c, in_jax, worst
 
@@ -87,6 +98,25 @@ class Sorted(AbstractMemoryless):
 
     def force_velocity(self, v):
         return jax.numpy.sort(jax.numpy.stack([self.rate * v, 2.0 * self.rate * v]))[0]
+
+
+def test_the_header_of_a_vehicle_states_the_longest_step(tmp_path):
+    """Steps as long as those of the instants are too long for steep friction, which `simulate` divides by itself."""
+    steep = quarter_car_000(Linear(2000.0) + CoulombFriction(400.0, 4e-4))
+    header = to_c(steep, tmp_path / "car.c")[0].read_text(encoding="utf-8")
+    stated = float(header.partition("#define CAR_LONGEST_STEP ")[2].split()[0])
+    assert stated == pytest.approx(1e-3 / substeps_needed(steep, 1e-3)) and stated < 0.5e-3
+    assert "longer than CAR_LONGEST_STEP" in header
+
+
+def test_a_test_program_replaces_its_like_and_no_other_export(tmp_path):
+    other = to_c(Linear(1111.0), tmp_path / "rear_test.c")[1]
+    with pytest.raises(ValueError, match=r"leave room for its test program, rear_test\.c, but is rear\.c"):
+        to_c(Linear(2222.0), tmp_path / "rear.c")
+    assert "1111" in other.read_text(encoding="utf-8") and not (tmp_path / "rear.c").exists()
+    for rate in (1111.0, 2222.0):
+        source = to_c(Linear(rate), tmp_path / "front.c")[1].read_text(encoding="utf-8")
+    assert "2222" in source
 
 
 def test_refusals(tmp_path):
