@@ -6,8 +6,8 @@ from jaxdamp.identify.bayes import Posterior as Posterior, Spread as Spread
 from jaxdamp.identify.comparing import Comparison as Comparison, compare, fit_each as fit_each
 from jaxdamp.identify.control_charts import AbstractChart as AbstractChart, Cusum, Ewma, Shewhart
 from jaxdamp.identify.cross_validation import CrossValidation as CrossValidation, cross_validate
-from jaxdamp.identify.design_goal import MachineLimits
-from jaxdamp.identify.designing import ExperimentDesign as ExperimentDesign, design_experiment, extent as extent
+from jaxdamp.identify.design_candidates import MachineLimits, extent as extent
+from jaxdamp.identify.designing import ExperimentDesign as ExperimentDesign, design_experiment
 from jaxdamp.identify.estimates import Estimate as Estimate, rounded as rounded
 from jaxdamp.identify.fitting import fit, solve
 from jaxdamp.identify.judging import judge

@@ -1,79 +1,90 @@
-"""What a design of experiments makes small, the runs that it chooses from, and the information of a run."""
+"""What a design of experiments makes small, and what the runs that it chooses from say of the parameters."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple, final
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, PyTree
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
-from jaxdamp.bench import BenchRun, Excitation, MultiSineTest, RandomTest, SineTest, TriangleTest
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp.bench import BenchRun, CommandedExcitation, Excitation
+from jaxdamp.dampers import AbstractDamper, command_paths
+from jaxdamp.identify.design_candidates import MachineLimits, Point, beyond, refuse_all
 from jaxdamp.identify.model import law_of
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.problem import linearised
 from jaxdamp.identify.traces import Batch
-from jaxdamp.parameters import FreeParameters, match_paths
+from jaxdamp.parameters import FreeParameters, get, match_paths
 from jaxdamp.rig import Rig
 
 
-VAGUE = 1e3  # standard deviation of a parameter without a prior, relative to its value
+VAGUE = 1e3  # standard deviation of a parameter without a prior, relative to its scale
 ROUNDS = 20  # of exchanges at most
 WORTH = 1e-9  # relative decrease of a criterion that counts as one
-SPREAD = (1.0, 2.3, 5.3)  # frequencies of a multi-sine, relative to the lowest
-OCTAVES = 3.0  # width of the band of a random test
-FEWEST_CYCLES = 3  # of a run, however slow
-LEAST_STROKE = 1e-4  # m, that a machine moves well
 
 
 @dataclasses.dataclass(frozen=True)
 class Goal:
-    """What is minimised, in parameters relative to their values."""
+    """What is minimised, in parameters relative to their scale."""
 
     criterion: str
-    scale: Float[np.ndarray, " free"]
+    scale: Float[np.ndarray, " free"]  # that a change of each number is compared with
     before: Float[np.ndarray, "free free"]  # information of the prior
     slopes: Float[np.ndarray, " free"]  # of the function
 
     @classmethod
     def of(
         cls,
-        free: FreeParameters,
+        known: "Information",
         criterion: str,
         function: Callable[[PyTree], PyTree] | None,
         prior: Mapping[str, float] | None,
     ) -> "Goal":
-        """The goal of a criterion, with what is known of the parameters before."""
-        values = np.abs(np.asarray(free.values, float))
-        scale = np.where(values > 0, values, 1.0)
-        spread = VAGUE * scale
-        paths = [p.path for p in free.owners]
+        """The goal of a criterion, with what is known of the parameters before.
+
+        A zero is no size to compare with: in its place is the largest value of its vector, else its prior, else the
+        change that moves the force by its RMS.
+        """
+        free = known.free
+        values, paths = np.abs(np.asarray(free.values, float)), np.array([p.path for p in free.owners])
+        deviations = np.full(values.size, np.nan)
         for name, deviation in (prior or {}).items():
             _checks.positive(f"prior[{name!r}]", deviation)
-            spread[np.isin(paths, match_paths(list(dict.fromkeys(paths)), [name]))] = deviation
-        slopes = np.zeros(values.size)
-        if function is not None:
-            slopes = np.asarray(jax.grad(lambda v: jnp.asarray(function(law_of(free.build(v))), float))(free.values))
-            if not np.any(slopes):
-                _checks.refuse("function", "depend on a free parameter", "one that does not")
+            deviations[np.isin(paths, match_paths(list(dict.fromkeys(paths.tolist())), [name]))] = deviation
+        stated = np.isfinite(deviations)
+        scale = np.where(values > 0, values, [np.max(values[paths == path]) for path in paths])
+        scale = np.where(scale > 0, scale, np.where(stated, deviations, known.large))
+        spread = np.where(stated, deviations, VAGUE * scale)
+        slopes = np.zeros(values.size) if function is None else _slopes(function, free)
         return cls(criterion, scale, np.diag((scale / spread) ** 2), slopes * scale)
 
     def value(self, matrices: Float[np.ndarray, "*sets free free"]) -> Float[np.ndarray, "*sets"]:
         """The criterion of sums of information, less is better."""
-        total = self.before + matrices * np.outer(self.scale, self.scale)
         if self.criterion == "D":
-            return np.asarray(-np.linalg.slogdet(total)[1])
-        inverse = np.linalg.inv(total)
+            return np.asarray(-np.linalg.slogdet(self._relative(matrices))[1])
+        sizes, axes = self._principal(matrices)
         if self.criterion == "A":
-            return np.asarray(np.trace(inverse, axis1=-2, axis2=-1))
-        return np.asarray(np.einsum("i,...ij,j->...", self.slopes, inverse, self.slopes))
+            return np.asarray(np.sum(1.0 / sizes, axis=-1))
+        return np.asarray(np.sum(np.einsum("i,...ij->...j", self.slopes, axes) ** 2 / sizes, axis=-1))
 
     def covariance(self, total: Float[np.ndarray, "free free"]) -> Float[np.ndarray, "free free"]:
         """Of the parameters, in their units."""
-        return np.linalg.inv(self.before + total * np.outer(self.scale, self.scale)) * np.outer(self.scale, self.scale)
+        sizes, axes = self._principal(total)
+        return (axes / sizes) @ axes.T * np.outer(self.scale, self.scale)
+
+    def _relative(self, matrices: Float[np.ndarray, "*sets free free"]) -> Float[np.ndarray, "*sets free free"]:
+        """Information of the relative parameters, with that of the prior."""
+        return self.before + matrices * np.outer(self.scale, self.scale)
+
+    def _principal(
+        self, matrices: Float[np.ndarray, "*sets free free"]
+    ) -> tuple[Float[np.ndarray, "*sets free"], Float[np.ndarray, "*sets free free"]]:
+        """Principal values and axes of the information: never less than the prior's, which rounding could lose."""
+        sizes, axes = np.linalg.eigh(self._relative(matrices))
+        return np.maximum(sizes, np.diag(self.before).min()), axes
 
     def function_error(self, covariance: Float[np.ndarray, "free free"]) -> float | None:
         """Standard error of the function; `None` without one."""
@@ -115,6 +126,22 @@ class Goal:
         return order
 
 
+def _slopes(function: Callable[[PyTree], PyTree], free: FreeParameters) -> Float[np.ndarray, " free"]:
+    """Derivatives of a function of a law, which is one number, by the free parameters."""
+
+    def number(values: Float[Array, " free"]) -> Float[Array, ""]:
+        value = function(law_of(free.build(values)))
+        if getattr(value, "shape", () if isinstance(value, int | float) else None) != ():
+            remedy = "Let it return one of them or their mean, such as `lambda law: law.force_velocity(0.5)`."
+            _checks.refuse("function", "return one number", f"one that returns {_checks.described(value)}", remedy)
+        return jnp.asarray(value, float)
+
+    slopes = np.asarray(jax.grad(number)(free.values))
+    if not np.any(slopes):
+        _checks.refuse("function", "depend on a free parameter", "one that does not")
+    return slopes
+
+
 class Information(NamedTuple):
     """What tests say of the free parameters."""
 
@@ -122,6 +149,7 @@ class Information(NamedTuple):
     matrices: Float[np.ndarray, "tests free free"]  # Fisher information of each test, in the units of the parameters
     force: Float[np.ndarray, " tests"]  # largest |F| in each test [N]
     power: Float[np.ndarray, " tests"]  # mean F v of each test [W]
+    large: Float[np.ndarray, " free"]  # change of each parameter that moves the force by its RMS, 1 if none does
 
 
 def information(
@@ -135,7 +163,9 @@ def information(
     force_noise: float,
 ) -> Information:
     """What tests would say of the free parameters of a law on a machine, by the model that a fit would use."""
-    runs = [_motion(test, number, sampling_rate) for number, test in enumerate(tests)]
+    paths = command_paths(law)
+    held = float(get(law, paths[0])) if paths and any(isinstance(t, CommandedExcitation) for t in tests) else None
+    runs = [_motion(test, number, sampling_rate, held) for number, test in enumerate(tests)]
     problem = prepare(law, runs, rig=rig, freeze=freeze, tie=tie)
     residual, jacobian = map(np.asarray, linearised(problem.free, problem.free.values, problem.residuals))
     batches = [part for part in problem.residuals if isinstance(part, Batch)]
@@ -148,111 +178,48 @@ def information(
     matrices = np.stack([jacobian[k].T @ jacobian[k] for k in rows]) / force_noise**2
     largest = np.array([np.max(np.abs(force[k])) for k in rows])
     power = np.array([np.mean(force[k] * velocity[k]) for k in rows])
-    return Information(problem.free, matrices, largest, power)
+    moved, level = np.linalg.norm(jacobian, axis=0), np.linalg.norm(force * weight)
+    large = np.divide(level, moved, out=np.ones(moved.shape), where=moved * level > 0)
+    return Information(problem.free, matrices, largest, power, large)
 
 
-def _motion(test: Excitation, number: int, sampling_rate: float) -> BenchRun:
-    """A test as a record whose force does not matter."""
+def _motion(test: Excitation, number: int, sampling_rate: float, held: float | None) -> BenchRun:
+    """A test as a record whose force does not matter; a test that sets no command has the one that is held."""
     time = np.arange(round(test.duration * sampling_rate)) / sampling_rate
-    velocity = test.velocity(time)
-    return BenchRun(f"{number}", time, test.stroke(time), velocity, velocity)
+    velocity, channel, unit = test.velocity(time), None, ""
+    if held is not None and isinstance(test, CommandedExcitation):
+        channel, unit, held = test.command(time), test.command_unit, None
+    motion = (f"{number}", time, test.stroke(time), velocity, velocity)
+    return BenchRun(*motion, command=held, command_channel=channel, command_unit=unit)
 
 
-@final
 @dataclasses.dataclass(frozen=True)
-class MachineLimits:
-    """What a test machine can do, and what a damper bears.
+class Pool:
+    """Candidates with their information."""
 
-    Arguments:
-        stroke: largest |x| [m], zero to peak.
-        velocity: largest |v| [m/s].
-        force: largest |F| [N] of the law on its machine.
-        power: largest mean power ⟨F v⟩ [W] that a run may turn into heat.
-        frequencies: lowest and highest frequency [Hz].
+    keys: list[Point | int]  # points of a grid, or numbers
+    tests: list[Excitation]
+    matrices: Float[np.ndarray, "tests free free"]
+    free: FreeParameters
+    left_out: tuple[str, ...]  # those with too much force or heat, in words
 
-    Raises:
-        ValueError: a limit that is not positive; frequencies that do not increase.
-    """
+    @classmethod
+    def of(cls, candidates: Mapping[Any, Excitation], information: Information, limits: MachineLimits | None) -> "Pool":
+        """Those within the limits of force and heat."""
+        over = [
+            ""
+            if limits is None or (force <= limits.force and power <= limits.power)
+            else beyond(test, limits, force, power)
+            for test, force, power in zip(candidates.values(), information.force, information.power, strict=True)
+        ]
+        left_out = tuple(filter(None, over))
+        if len(left_out) == len(over):
+            refuse_all(left_out)
+        kept = [item for item, words in zip(candidates.items(), over, strict=True) if not words]
+        matrices = information.matrices[[not words for words in over]]
+        return cls([k for k, _ in kept], [t for _, t in kept], matrices, information.free, left_out)
 
-    stroke: float | int
-    velocity: float | int
-    force: float | int = np.inf
-    power: float | int = np.inf
-    frequencies: tuple[float | int, float | int] = (0.5, 15.0)
-
-    def __post_init__(self) -> None:
-        for name in ("stroke", "velocity", "frequencies"):
-            _checks.positive(name, np.asarray(getattr(self, name), float))
-        for name in ("force", "power"):
-            if not getattr(self, name) > 0:
-                _checks.refuse(name, "be positive", getattr(self, name))
-        if not self.frequencies[0] < self.frequencies[1]:
-            _checks.refuse("frequencies", "increase", self.frequencies)
-
-
-class Point(NamedTuple):
-    """Where a candidate lies in the plane of the limits."""
-
-    waveform: str
-    stroke: float  # m, zero to peak
-    frequency: float  # Hz, the lowest
-
-
-WAVEFORMS = ("sine", "triangle", "random", "multisine")
-
-
-def excitation_at(point: Point, limits: MachineLimits, duration: float) -> Excitation | None:
-    """The test at a point; `None` if it is outside the limits."""
-    waveform, stroke, frequency = point
-    low, high = limits.frequencies
-    cycles = max(int(duration * frequency), FEWEST_CYCLES)
-    name = f"{waveform}_{1e3 * stroke:.3g}mm_{frequency:.3g}Hz"
-    widest = {"sine": 1.0, "triangle": 1.0, "random": 2.0**OCTAVES, "multisine": SPREAD[-1]}[waveform]
-    if not (LEAST_STROKE <= stroke <= limits.stroke and low <= frequency and frequency * widest <= high):
-        return None
-    if waveform == "random":
-        band = (frequency, frequency * widest)
-        return RandomTest(stroke, limits.velocity, cycles / frequency, band, warm_up=1.0 / frequency, name=name)
-    if waveform == "multisine":
-        lines = tuple(frequency * factor for factor in SPREAD)
-        return MultiSineTest(stroke, limits.velocity, lines, cycles / frequency, warm_up=1.0 / frequency, name=name)
-    test = (SineTest if waveform == "sine" else TriangleTest)(stroke, frequency, cycles, name=name)
-    return test if test.peak_velocity <= limits.velocity * (1.0 + 1e-9) else None
-
-
-def grid(
-    limits: MachineLimits, waveforms: Sequence[str], duration: float, strokes: int, frequencies: int
-) -> dict[Point, Excitation]:
-    """Tests over the range of a machine: strokes and frequencies in equal ratios, and on the limit of velocity."""
-    for waveform in waveforms:
-        _checks.one_of("waveforms", waveform, WAVEFORMS)
-    rates = np.geomspace(*limits.frequencies, frequencies)
-    slowest = limits.velocity / (2 * np.pi * limits.frequencies[1])
-    sizes = np.geomspace(max(min(limits.stroke / 10, slowest), LEAST_STROKE), limits.stroke, strokes)
-    points = [
-        Point(waveform, float(stroke), float(rate))
-        for waveform in waveforms
-        for rate in rates
-        for stroke in dict.fromkeys([*sizes, min(limits.velocity / (2 * np.pi * rate), limits.stroke)])
-    ]
-    return _within(points, limits, duration)
-
-
-def near(points: Sequence[Point], ratio: float, limits: MachineLimits, duration: float) -> dict[Point, Excitation]:
-    """Tests around some points: strokes and frequencies a ratio larger and smaller, moved inside the limits."""
-    factors = (1.0 / ratio, 1.0, ratio)
-    around = [
-        point._replace(
-            stroke=min(point.stroke * a, limits.stroke),
-            frequency=float(np.clip(point.frequency * b, *limits.frequencies)),
-        )
-        for point in dict.fromkeys(points)
-        for a in factors
-        for b in factors
-    ]
-    return _within(around, limits, duration)
-
-
-def _within(points: Sequence[Point], limits: MachineLimits, duration: float) -> dict[Point, Excitation]:
-    tests = {point: excitation_at(point, limits, duration) for point in points}
-    return {point: test for point, test in tests.items() if test is not None}
+    def joined(self, other: "Pool") -> "Pool":
+        """Both together."""
+        matrices = np.concatenate([self.matrices, other.matrices])
+        return Pool(self.keys + other.keys, self.tests + other.tests, matrices, self.free, self.left_out)

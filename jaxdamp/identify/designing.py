@@ -13,23 +13,25 @@ from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._settings import with_defaults
 from jaxdamp._tables import Column, Table
 from jaxdamp._traced import of_known_numbers
-from jaxdamp.bench import Excitation
-from jaxdamp.dampers import AbstractDamper
-from jaxdamp.identify.design_goal import WAVEFORMS, Goal, Information, MachineLimits, Point, grid, information, near
-from jaxdamp.parameters import FreeParameters
+from jaxdamp.bench import CommandedExcitation, Excitation
+from jaxdamp.dampers import AbstractDamper, command_words
+from jaxdamp.identify.design_candidates import WAVEFORMS, MachineLimits, Point, beyond, extent, grid, near, refuse_all
+from jaxdamp.identify.design_goal import Goal, Information, Pool, information
+from jaxdamp.identify.machine import free_fields
+from jaxdamp.parameters import FreeParameters, listed
 from jaxdamp.rig import Rig
 
 
 CRITERIA = ("D", "A", "c")
 FINER = (1.25, 1.08)  # ratios of stroke and frequency of the tests around the chosen ones
-WEAK = 0.5  # standard error, relative to the value, above which a parameter is not identifiable
+WEAK = 0.5  # standard error, relative to the size of its parameter, above which this is not identifiable
 
 
 class DesignSettings(TypedDict, total=False):
     """Which tests a design of experiments chooses from, and what is known of the parameters before.
 
     Arguments:
-        tests: the candidates, instead of a grid of tests within the limits.
+        tests: the candidates, instead of a grid of tests within the limits; those beyond limits are left out.
         waveforms: of the grid: "sine", "triangle", "random", "multisine".
         strokes: number of strokes of the grid.
         frequencies: number of frequencies of the grid.
@@ -74,6 +76,8 @@ class ExperimentDesign(AbstractResult):
             without a programme, or if more runs than it has would be needed.
         function_errors: expected standard error of the function of the criterion "c", with the design and with the
             programme; `None` where there is none.
+        undetermined: the free numbers whose expected standard error is more than half of their size.
+        warnings: those numbers, tests that the machine cannot run, and a command that is held, each in a sentence.
     """
 
     law: AbstractDamper
@@ -85,6 +89,8 @@ class ExperimentDesign(AbstractResult):
     programme_covariance: Float[np.ndarray, "free free"] | None = None
     runs_to_match: int | None = None
     function_errors: tuple[float | None, float | None] = (None, None)
+    undetermined: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @property
     def standard_errors(self) -> dict[str, float]:
@@ -107,7 +113,7 @@ class ExperimentDesign(AbstractResult):
         rows = []
         for i, (p, value) in enumerate(zip(self.free.owners, np.asarray(self.free.values), strict=True)):
             error = self.standard_errors[self.free.names[i]]
-            note = "not identifiable" if error > WEAK * abs(value) else ""
+            note = "not identifiable" if self.free.names[i] in self.undetermined else ""
             of_programme = () if others is None else (float(others[i]),)
             rows.append((self.free.names[i], p.unit or "–", float(value), error, *of_programme, note))
         return Table("Expected standard errors", tuple(columns), tuple(rows))
@@ -138,25 +144,10 @@ class ExperimentDesign(AbstractResult):
         count, match = len(self.programme), self.runs_to_match
         return f"{match or f'More than {count}'} such runs are as good as the {count} of the programme."
 
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Numbers that the runs will not determine."""
-        weak = [str(row["parameter"]) for row in self.table().records() if row["note"]]
-        return (f"The runs will not determine {', '.join(weak)}.",) * bool(weak)
-
     def __repr__(self) -> str:
         lines = [str(self.runs_table()), "", str(self.table())]
-        return "\n".join([*lines, *[self.summary] * (self.programme_covariance is not None)])
-
-
-def extent(test: Excitation) -> tuple[float, float]:
-    """Largest stroke [mm] and velocity [m/s] of a record.
-
-    Arguments:
-        test: the excitation.
-    """
-    time = np.arange(0.0, test.duration, 0.01 / test.highest_frequency)
-    return 1e3 * float(np.max(np.abs(test.stroke(time)))), float(np.max(np.abs(test.velocity(time))))
+        lines += [self.summary] * (self.programme_covariance is not None)
+        return "\n".join([*lines, *(f"warning: {text}" for text in self.warnings)])
 
 
 @of_known_numbers
@@ -183,22 +174,25 @@ def design_experiment(
     The information is that of the law with the values given: a design is as good as the guess. Fit, and design again.
 
     Arguments:
-        law: the law with the values that are expected, such as that of a first fit.
-        limits: of the machine; the candidates are made from them (without `tests`), and those with too much force or
-            heat are left out.
+        law: the law with the values that are expected, such as that of a first fit. A command is held at its value
+            in all tests but those that set it (`bench.CommandStep`).
+        limits: of the machine; the candidates are made from them (without `tests`), and those beyond them or with too
+            much force or heat are left out. A warning names those of `tests`, and what of the programme is beyond.
         runs: number of runs.
         force_noise: standard deviation of a sample of the measured force [N], as white noise.
-        rig: the test machine, as in `fit`: its free numbers are determined too.
+        rig: the test machine with the values that are expected: those that are not at their defaults are determined
+            too.
         criterion: "D", the volume of the confidence ellipsoid; "A", the sum of the squared relative standard errors;
-            "c", the standard error of `function`.
+            "c", the standard error of `function`. The error of a zero is relative to the largest value of its vector,
+            else to its `prior`, else to the change that moves the force by its RMS.
         function: of the law, a number computed by JAX, such as a ride metric with it; for the criterion "c".
         programme: tests to compare with, such as `bench.programmes.paper_000_table_1()`.
         settings: keywords, all optional: `tests`, `waveforms`, `strokes`, `frequencies`, `duration` and `sampling_rate`
             say which tests are candidates, `freeze`, `tie` and `prior` what is known (see `DesignSettings`).
 
     Raises:
-        ValueError: neither limits nor tests; no candidate within the limits; a criterion without its function, or a
-            function that the criterion does not use; unknown names.
+        ValueError: a law or machine without values; neither limits nor tests; no candidate within the limits; a
+            criterion without its function, or a function that the criterion does not use; unknown names.
 
     >>> from jaxdamp.dampers import Bilinear
     >>> limits = MachineLimits(stroke=0.02, velocity=0.5)
@@ -209,21 +203,15 @@ def design_experiment(
     True
     """
     tests, duration = settings["tests"], settings["duration"]
-    _check(limits, tests, runs, force_noise, criterion, function)
+    _check(law, rig, limits, runs, force_noise, criterion, function, settings)
     freeze, tie, rate = settings["freeze"], settings["tie"], settings["sampling_rate"]
     informed = functools.partial(
         information, law, rig=rig, freeze=freeze, tie=tie, sampling_rate=rate, force_noise=force_noise
     )
-    if tests is not None:
-        candidates: dict[Any, Excitation] = dict(enumerate(tests))
-    else:
-        assert limits is not None
-        candidates = dict(grid(limits, settings["waveforms"], duration, settings["strokes"], settings["frequencies"]))
-    if not candidates:
-        _checks.refuse("limits", "leave tests to choose from", "no candidate", "Allow more, or give `tests`.")
-    pool = _Pool.of(candidates, informed(list(candidates.values())), limits)
-    free = pool.free
-    goal = Goal.of(free, criterion, function, settings["prior"])
+    candidates, left_out = _candidates(limits, settings)
+    first = informed(list(candidates.values()))
+    pool = Pool.of(candidates, first, limits)
+    goal = Goal.of(first, criterion, function, settings["prior"])
     chosen = goal.exchanged(goal.added([], runs, pool.matrices), pool.matrices)
     for ratio in FINER if tests is None else ():
         assert limits is not None
@@ -231,32 +219,89 @@ def design_experiment(
         more = near([key for key in keys if isinstance(key, Point)], ratio, limits, duration)
         new = {point: test for point, test in more.items() if point not in pool.keys}
         if new:
-            pool = pool.joined(_Pool.of(new, informed(list(new.values())), limits))
+            pool = pool.joined(Pool.of(new, informed(list(new.values())), limits))
         chosen = goal.exchanged(chosen, pool.matrices)
     chosen = goal.ordered(chosen, pool.matrices)
     covariance = goal.covariance(pool.matrices[chosen].sum(axis=0))
-    design = ExperimentDesign(law, _named([pool.tests[k] for k in chosen]), free, covariance, criterion)
-    design = dataclasses.replace(design, function_errors=(goal.function_error(covariance), None))
-    return design if programme is None else _compared(design, goal, pool, chosen, tuple(programme), informed)
+    left_out += pool.left_out if tests is not None else ()
+    best, firm = [pool.tests[k] for k in chosen], np.sqrt(np.diag(covariance)) <= WEAK * goal.scale
+    weak = tuple(name for name, known in zip(pool.free.names, firm, strict=True) if not known)
+    design = ExperimentDesign(
+        law,
+        _named(best),
+        pool.free,
+        covariance,
+        criterion,
+        function_errors=(goal.function_error(covariance), None),
+        undetermined=weak,
+        warnings=_warnings(law, best, weak, left_out),
+    )
+    return design if programme is None else _compared(design, goal, pool, chosen, tuple(programme), informed, limits)
 
 
 def _check(
+    law: AbstractDamper,
+    rig: Rig | None,
     limits: MachineLimits | None,
-    tests: Iterable[Excitation] | None,
     runs: int,
     force_noise: float,
     criterion: str,
     function: Callable[[PyTree], PyTree] | None,
+    settings: DesignSettings,
 ) -> None:
-    if limits is None and tests is None:
+    """Refuse what no design can be made for."""
+    expected = "There are no records yet that a start could be taken from: write"
+    remedy = f"{expected} the law with the numbers you expect, such as `dampers.Bilinear(2600.0, 1200.0)`."
+    _checks.instance("law", law, AbstractDamper, "be a law with its numbers", remedy)
+    remedy = f"{expected} the machine with the numbers you expect, such as `rig=Rig(gas_force=-100.0)`."
+    _checks.instance("rig", rig, (Rig, type(None)), "be a `Rig` with its numbers", remedy)
+    if rig is not None and not free_fields(rig):
+        remedy = "Write those that the runs shall determine, `rig=Rig(gas_force=-100.0)`, or leave `rig` out."
+        _checks.refuse("rig", "have a number that is not at its default", "one that adds nothing", remedy)
+    if limits is None and settings["tests"] is None:
         remedy = "Write `limits=MachineLimits(stroke=0.05, velocity=1.0)` or `tests=[...]`."
         _checks.refuse("limits", "be given, or `tests`", "neither", remedy)
-    _checks.counts(runs=runs)
+    _checks.counts(runs=runs, strokes=settings["strokes"], frequencies=settings["frequencies"])
+    for name in ("duration", "sampling_rate"):
+        _checks.positive(name, settings[name])
     _checks.positive("force_noise", force_noise)
     _checks.one_of("criterion", criterion, CRITERIA)
     if (criterion == "c") != (function is not None):
         remedy = "Write `criterion='c', function=lambda law: law.force_velocity(0.5)`."
         _checks.refuse("function", "be given with the criterion 'c', and only with it", repr(function), remedy)
+
+
+def _candidates(
+    limits: MachineLimits | None, settings: DesignSettings
+) -> tuple[dict[Any, Excitation], tuple[str, ...]]:
+    """The tests to choose from, by point of a grid or by number, and in words those that the machine cannot run."""
+    beside: tuple[str, ...] = ()
+    if settings["tests"] is None:
+        assert limits is not None
+        how = settings["waveforms"], settings["duration"], settings["strokes"], settings["frequencies"]
+        candidates: dict[Any, Excitation] = dict(grid(limits, *how))
+    else:
+        tests = [(test, beyond(test, limits)) for test in settings["tests"]]
+        if not tests:
+            _checks.refuse("tests", "hold at least one test", "empty", "Leave it out for a grid within `limits`.")
+        candidates = {number: test for number, (test, over) in enumerate(tests) if not over}
+        beside = tuple(over for _, over in tests if over)
+    if not candidates:
+        refuse_all(beside)
+    return candidates, beside
+
+
+def _warnings(
+    law: AbstractDamper, tests: Sequence[Excitation], weak: Sequence[str], left_out: Sequence[str]
+) -> tuple[str, ...]:
+    """Sentences on numbers not determined, candidates that the machine cannot run, and a command that is held."""
+    said = [f"The runs will not determine {', '.join(weak)}."] * bool(weak)
+    said += [f"Left out of the candidates as beyond `limits`: {listed(left_out)}."] * bool(left_out)
+    held = command_words(law)
+    if held and not any(isinstance(test, CommandedExcitation) for test in tests):
+        remedy = "Design for each command (`dampers.with_command`), or give `tests` that vary it (`bench.CommandStep`)."
+        said += [f"All runs are {held}, and say little or nothing of numbers that act at others. {remedy}"]
+    return tuple(said)
 
 
 def _named(tests: Sequence[Any]) -> tuple[Excitation, ...]:
@@ -270,51 +315,21 @@ def _named(tests: Sequence[Any]) -> tuple[Excitation, ...]:
     return tuple(named)
 
 
-@dataclasses.dataclass(frozen=True)
-class _Pool:
-    """Candidates with their information."""
-
-    keys: list[Point | int]  # points of a grid, or numbers
-    tests: list[Excitation]
-    matrices: Float[np.ndarray, "tests free free"]
-    free: FreeParameters
-
-    @classmethod
-    def of(
-        cls, candidates: Mapping[Any, Excitation], information: Information, limits: MachineLimits | None
-    ) -> "_Pool":
-        """Those within the limits of force and heat."""
-        bears = [
-            limits is None or (force <= limits.force and power <= limits.power)
-            for force, power in zip(information.force, information.power, strict=True)
-        ]
-        if not any(bears):
-            assert limits is not None
-            value = f"no candidate below {limits.force:g} N and {limits.power:g} W"
-            _checks.refuse(
-                "limits", "leave tests to choose from", value, "Allow more, or add slower and shorter tests."
-            )
-        items = [item for item, within in zip(candidates.items(), bears, strict=True) if within]
-        return cls(
-            [k for k, _ in items], [t for _, t in items], information.matrices[np.array(bears)], information.free
-        )
-
-    def joined(self, other: "_Pool") -> "_Pool":
-        """Both together."""
-        matrices = np.concatenate([self.matrices, other.matrices])
-        return _Pool(self.keys + other.keys, self.tests + other.tests, matrices, self.free)
-
-
 def _compared(
     design: ExperimentDesign,
     goal: Goal,
-    pool: _Pool,
+    pool: Pool,
     chosen: list[int],
     programme: tuple[Excitation, ...],
     informed: Callable[[Sequence[Excitation]], Information],
+    limits: MachineLimits | None,
 ) -> ExperimentDesign:
     """The design beside a programme of tests."""
-    of_programme = informed(programme).matrices.sum(axis=0)
+    known = informed(programme)
+    each = zip(programme, known.force, known.power, strict=True)
+    over = [words for test, force, power in each if (words := beyond(test, limits, force, power))]
+    beside = [f"The machine cannot run {len(over)} of the {len(programme)} tests of the programme: {listed(over)}."]
+    of_programme = known.matrices.sum(axis=0)
     aim = float(goal.value(of_programme))
     longest = goal.added(chosen, max(len(programme) - len(chosen), 0), pool.matrices)
     reached = goal.value(np.cumsum(pool.matrices[longest[: len(programme)]], axis=0)) <= aim
@@ -325,4 +340,5 @@ def _compared(
         programme_covariance=covariance,
         runs_to_match=int(np.argmax(reached)) + 1 if np.any(reached) else None,
         function_errors=(design.function_errors[0], goal.function_error(covariance)),
+        warnings=(*design.warnings, *beside * bool(over)),
     )

@@ -26,7 +26,7 @@ from jaxdamp.identify.many import fit_many
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.model import rig_of
 from jaxdamp.identify.noise import noise_of
-from jaxdamp.identify.preparing import prepare, records_in_words, weights
+from jaxdamp.identify.preparing import prepare, records_in_words, weighting_of
 from jaxdamp.identify.printed import evaluator
 from jaxdamp.identify.problem import Problem, linearised
 from jaxdamp.identify.search import SearchEnd, Solver
@@ -173,11 +173,9 @@ def fit(
     _checks.one_of("loss", loss, LOSSES)
     if force_noise is not None:
         _checks.positive("force_noise", force_noise)
-    records, weighting = as_runs(runs, call="fit(law, runs)"), settings["weighting"]
+    records = as_runs(runs, call="fit(law, runs)")
     runs = usable(records, settings["bad_records"], robust=loss != "squares")
-    if len(runs) < len(records) and not isinstance(weighting, str):
-        sigma = zip(records, weights(weighting, records), strict=True)
-        settings = {**settings, "weighting": [s for run, s in sigma if run in runs]}
+    settings = {**settings, "weighting": weighting_of(runs, records, settings["weighting"])}
     problem = prepare(law, runs, rig=rig, **part(settings, PROBLEM))
     if settings["bad_records"] != "keep" and not settings["per_record"] and settings["initial_state"] != "estimated":
         refuse_contradicting(contradicting(problem.free.tree, problem.fitted_to))

@@ -306,6 +306,7 @@ class LearntStart(AbstractTrainedStart):
 
     def trainings(self, runs: Sequence[BenchRun]) -> list[Training]:
         """The training from each key."""
+        runs = list({run.fingerprint: run for run in runs}.values())  # a copy would be no record to stop by
         if len(runs) == 1:
             time = runs[0].time
             middle = float(time[round(TRAINED_ON * len(time))])
@@ -315,7 +316,7 @@ class LearntStart(AbstractTrainedStart):
             stop = sorted(range(len(runs)), key=lambda i: runs[i].peak_velocity)[len(runs) // 2]
         rest = [run for i, run in enumerate(runs) if i != stop]
         how: dict[str, Any] = {"steps": STEPS, "patience": PATIENCE, "learning_rate": LEARNING_RATE}
-        how |= {"weighting": "runs", "samples_per_cycle": SAMPLES_PER_CYCLE} | self.options
+        how |= {"weighting": "runs", "samples_per_cycle": SAMPLES_PER_CYCLE, "bad_records": "keep"} | self.options
         return [train(self.untrained(rest, key), rest, held_out=runs[stop], **how) for key in range(self.keys)]
 
     def untrained(self, runs: Sequence[BenchRun], key: int = 0) -> AbstractDamper:

@@ -248,3 +248,12 @@ def weights(weighting: str | Sequence[float] | np.ndarray, runs: Sequence[BenchR
     if not kept.size:
         _checks.refuse("weighting", "leave at least one record", "infinite for all")
     return sigma
+
+
+def weighting_of(
+    runs: Sequence[BenchRun], records: Sequence[BenchRun], weighting: str | Sequence[float] | np.ndarray
+) -> str | Sequence[float] | np.ndarray:
+    """The weighting of those of the records that are kept, where it is a number for each record."""
+    if isinstance(weighting, str) or len(runs) == len(records):
+        return weighting
+    return [sigma for run, sigma in zip(records, weights(weighting, records), strict=True) if run in runs]

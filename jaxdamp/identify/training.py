@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Protocol, TypedDict, Unpack, runtime_checkable
+from typing import NamedTuple, Protocol, TypedDict, Unpack, runtime_checkable
 
 import equinox as eqx
 import jax
@@ -18,17 +18,18 @@ from jaxdamp._settings import with_defaults
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Contents, Table, with_unit
 from jaxdamp._traced import of_known_numbers
-from jaxdamp.bench import BenchRun, as_runs
+from jaxdamp.bench import BenchRun, as_runs, usable
+from jaxdamp.identify.contradicting import contradicting, refuse_contradicting
 from jaxdamp.identify.judging import notes_on
 from jaxdamp.identify.law_result import AbstractFitted
 from jaxdamp.identify.machine import Machine
 from jaxdamp.identify.model import Model, covered_range, law_of, rig_of, with_range
 from jaxdamp.identify.predicting import score
-from jaxdamp.identify.preparing import prepare
-from jaxdamp.identify.problem import AbstractResiduals
+from jaxdamp.identify.preparing import prepare, weighting_of
+from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.starting import Start
 from jaxdamp.identify.traces import batches
-from jaxdamp.parameters import Coordinates
+from jaxdamp.parameters import Coordinates, listed
 
 
 @runtime_checkable
@@ -54,15 +55,19 @@ class TrainSettings(TypedDict, total=False):
         tie: parameters that take the values of others, as in `Free`.
         weighting: of `runs`, as in `ProblemSettings`.
         samples_per_cycle: slow records are averaged in blocks down to this number.
+        bad_records: as in `FitSettings`, of `held_out` too.
     """
 
     freeze: Sequence[str]
     tie: Mapping[str, str] | None
     weighting: str | Sequence[float] | np.ndarray
     samples_per_cycle: int
+    bad_records: str
 
 
-TRAIN: TrainSettings = {"freeze": (), "tie": None, "weighting": "samples", "samples_per_cycle": 200}
+TRAIN: TrainSettings = {
+    "freeze": (), "tie": None, "weighting": "samples", "samples_per_cycle": 200, "bad_records": "refuse",
+}  # fmt: skip
 CHUNK = 25  # steps in one compiled call, after which the held-out records are evaluated
 
 
@@ -79,6 +84,7 @@ class Training(AbstractFitted):
         held_out_history: the same over the held-out records.
         best_step: the step that the law comes from.
         stopped: reason for the end of the training, in words.
+        scored_only: names of the records with an infinite weighting, which were not trained on.
     """
 
     held_out: tuple[BenchRun, ...]
@@ -89,11 +95,13 @@ class Training(AbstractFitted):
     held_out_history: Float[np.ndarray, " entries"]
     best_step: int
     stopped: str
+    scored_only: tuple[str, ...] = ()
 
     def table(self) -> Table:
         """The errors on each record, trained on or held out."""
         columns = Column("record"), Column("use"), Column("fit", "%", ".1f")
-        uses = ["training"] * len(self.runs) + ["held out"] * len(self.held_out)
+        uses = ["scored only" if run.name in self.scored_only else "training" for run in self.runs]
+        uses += ["held out"] * len(self.held_out)
         rows = tuple((s.name, use, *s[2:0:-1], s.largest_error) for s, use in zip(self.scores, uses, strict=True))
         return Table(
             f"{type(self.law).__name__} after training",
@@ -114,9 +122,9 @@ class Training(AbstractFitted):
     @property
     def summary(self) -> str:
         """Law, number of records, errors, and how the training ended."""
-        several = "s" * (len(self.runs) > 1)
+        count = len(self.runs) - len(self.scored_only)
         return (
-            f"{type(self.law).__name__} trained on {len(self.runs)} record{several}: {self.fit_percent:.1f} %, RMSE "
+            f"{type(self.law).__name__} trained on {count} record{'s' * (count > 1)}: {self.fit_percent:.1f} %, RMSE "
             f"{self.rmse:.4g} N; on {len(self.held_out)} held out: {self.held_out_fit_percent:.1f} %, RMSE "
             f"{self.held_out_rmse:.4g} N; best at step {self.best_step}, {self.stopped}"
         )
@@ -157,12 +165,12 @@ def train(
         patience: number of steps without a decrease of the held-out error after which the training stops.
         learning_rate: initial learning rate of Adam; it decreases to a hundredth along a cosine over `steps`.
         optimiser: any optax optimiser instead.
-        settings: keywords of `fit`, all optional: `freeze`, `tie`, `weighting`, and `samples_per_cycle`, 200 if left
-            out (see `TrainSettings`).
+        settings: keywords of `fit`, all optional: `freeze`, `tie`, `weighting`, `bad_records`, and `samples_per_cycle`,
+            200 if left out (see `TrainSettings`).
 
     Raises:
-        ValueError: no records on either side, a record on both; a law without finite forces; names that fit no
-            parameter.
+        ValueError: no records on either side, a record on both; a record with an error; records that contradict each
+            other; a law without finite forces; names that fit no parameter.
 
     >>> from jaxdamp import bench, dampers
     >>> dyno = bench.VirtualDyno(dampers.Lag(dampers.Linear(2000.0), 0.004), force_noise=5.0)
@@ -172,15 +180,84 @@ def train(
     >>> trained.held_out_fit_percent > 90.0
     True
     """
-    runs, held_out = as_runs(runs, call="train(law, runs, held_out=...)"), as_runs(held_out, "held_out")
-    _check(runs, held_out, steps, patience)
+    records, held_out = as_runs(runs, call="train(law, runs, held_out=...)"), as_runs(held_out, "held_out")
+    _check(records, held_out, steps, patience)
     _checks.positive("learning_rate", learning_rate)
+    bad_records = settings.pop("bad_records")
+    runs, held_out = usable(records, bad_records), usable(held_out, bad_records, argument="held_out")
+    settings["weighting"] = weighting_of(runs, records, settings["weighting"])
     problem = prepare(law, runs, rig=rig, **settings)
-    coordinates, used, start = Coordinates(problem.free, smooth="all"), problem.residuals, problem.free.tree
-    checked = batches(start, held_out, [1.0] * len(held_out), settings["samples_per_cycle"])[0]
-    level = float(np.sqrt(np.mean(np.concatenate([run.force for run in problem.fitted_to]) ** 2)))
+    if bad_records != "keep":
+        refuse_contradicting(contradicting(problem.free.tree, problem.fitted_to))
+    coordinates = Coordinates(problem.free, smooth="all")
+    checked = batches(problem.free.tree, held_out, [1.0] * len(held_out), settings["samples_per_cycle"])[0]
     rule = _adam(learning_rate, steps) if optimiser is None else optimiser
+    course = _course(coordinates, problem, checked, rule, steps, patience)
+    fitted = np.isfinite(problem.sigma)
+    warms = problem.law.traits().temperature_dependent
+    trained = with_range(_model(coordinates, course.best), covered_range(problem.fitted_to, warms=warms))
+    percent, rmse, scores = score(trained, runs, fitted)
+    held_percent, held_rmse, held_scores = score(trained, held_out)
+    rate = f"`learning_rate` ({learning_rate:g})" if optimiser is None else "the learning rate of `optimiser`"
+    unmoved = [f"No step was better on `held_out` than the start, which is the result: lower {rate}, if it is no fit."]
+    return Training(
+        law=law_of(trained),
+        rig=rig_of(trained),
+        runs=runs,
+        held_out=held_out,
+        fit_percent=percent,
+        rmse=rmse,
+        held_out_fit_percent=held_percent,
+        held_out_rmse=held_rmse,
+        scores=scores + held_scores,
+        warnings=(*unmoved * (course.best_step == 0), *notes_on(trained, problem.fitted_to)),
+        status=Status.STOPPED_EARLY if course.taken[-1] < steps else Status.ALL_STEPS,
+        steps=np.array(course.taken, dtype=float),
+        history=np.array(course.history),
+        held_out_history=np.array(course.tested),
+        best_step=course.best_step,
+        stopped=course.stopped,
+        scored_only=tuple(run.name for run, counts in zip(runs, fitted, strict=True) if not counts),
+    )
 
+
+def _check(runs: Sequence[BenchRun], held_out: Sequence[BenchRun], steps: int, patience: int) -> None:
+    """Refuse an empty side, and a record that is on both, under another name too."""
+    for name, some in (("runs", runs), ("held_out", held_out)):
+        if not some:
+            remedy = "Take for example `runs=records[:-1], held_out=records[-1]`."
+            _checks.refuse(name, "hold at least one record", "empty", remedy)
+    trained_on = {run.fingerprint: run.name for run in runs}
+    both = [run for run in held_out if run.fingerprint in trained_on]
+    if both:
+        named = [f"{run.name} (the same as {trained_on[run.fingerprint]} of `runs`)" for run in both]
+        remedy = "Leave them out of one of the two: a record that is trained on cannot say when to stop."
+        _checks.refuse("held_out", "hold records that are not trained on", listed(named), remedy)
+    _checks.counts(steps=steps, patience=patience)
+
+
+class _Course(NamedTuple):
+    """How a training went, with an entry every `CHUNK` steps."""
+
+    best: Array  # coordinates with the smallest error on the records held out
+    best_step: int
+    taken: list[int]  # steps
+    history: list[float]  # RMSE [N] over the training records
+    tested: list[float]  # over those held out
+    stopped: str
+
+
+def _course(
+    coordinates: Coordinates,
+    problem: Problem,
+    checked: Sequence[AbstractResiduals],
+    rule: Optimiser,
+    steps: int,
+    patience: int,
+) -> _Course:
+    """Descend until the steps are taken, or the error on the records held out no longer falls."""
+    used = problem.residuals
+    level = float(np.sqrt(np.mean(np.concatenate([run.force for run in problem.fitted_to]) ** 2)))
     raw = jnp.asarray(coordinates.start, problem.free.values.dtype)
     state = rule.init(raw)
     best, best_step, reached = raw, 0, float(_error(coordinates, raw, checked))
@@ -206,40 +283,7 @@ def train(
             if done - best_step >= patience:
                 stopped = f"stopped at step {done}, {patience} steps after the held-out error last fell"
                 break
-
-    warms = problem.law.traits().temperature_dependent
-    trained = with_range(_model(coordinates, best), covered_range(problem.fitted_to, warms=warms))
-    percent, rmse, scores = score(trained, runs, np.isfinite(problem.sigma))
-    held_percent, held_rmse, held_scores = score(trained, held_out)
-    return Training(
-        law=law_of(trained),
-        rig=rig_of(trained),
-        runs=runs,
-        held_out=held_out,
-        fit_percent=percent,
-        rmse=rmse,
-        held_out_fit_percent=held_percent,
-        held_out_rmse=held_rmse,
-        scores=scores + held_scores,
-        warnings=tuple(notes_on(trained, problem.fitted_to)),
-        status=Status.STOPPED_EARLY if taken[-1] < steps else Status.ALL_STEPS,
-        steps=np.array(taken, dtype=float),
-        history=np.array(history),
-        held_out_history=np.array(tested),
-        best_step=best_step,
-        stopped=stopped,
-    )
-
-
-def _check(runs: Sequence[BenchRun], held_out: Sequence[BenchRun], steps: int, patience: int) -> None:
-    for name, some in (("runs", runs), ("held_out", held_out)):
-        if not some:
-            remedy = "Take for example `runs=records[:-1], held_out=records[-1]`."
-            _checks.refuse(name, "hold at least one record", "empty", remedy)
-    both = [run.name for run in held_out if any(run is other for other in runs)]
-    if both:
-        _checks.refuse("held_out", "hold records that are not trained on", ", ".join(both))
-    _checks.counts(steps=steps, patience=patience)
+    return _Course(best, best_step, taken, history, tested, stopped)
 
 
 @functools.lru_cache

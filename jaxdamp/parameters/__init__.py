@@ -40,6 +40,7 @@ from jaxdamp.parameters._paths import (
     check_parameters as check_parameters,
     checked as checked,
     get,
+    listed as listed,
     match_parameters as match_parameters,
     match_paths as match_paths,
     matched_in_words as matched_in_words,

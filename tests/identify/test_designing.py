@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from jaxdamp import identify
-from jaxdamp.bench import MultiSineTest, SineTest, TriangleTest, VirtualDyno, programmes
-from jaxdamp.dampers import AbstractDamper, Besinger, Bilinear, Linear
+from jaxdamp.bench import CommandStep, MultiSineTest, RandomTest, SineTest, TriangleTest, VirtualDyno, programmes
+from jaxdamp.dampers import AbstractDamper, Besinger, Bilinear, Linear, Scheduled, Spring, Table
 from jaxdamp.identify import MachineLimits, design_experiment
 from jaxdamp.identify.design_goal import information
 from jaxdamp.rig import Rig
@@ -135,16 +135,85 @@ def test_velocities_are_derivatives_and_limits_are_touched(test):
         ({"limits": MachineLimits(0.02, 0.5), "waveforms": ["sines"]}, "waveforms"),
         ({"limits": MachineLimits(0.02, 0.5, power=1e-3), "waveforms": ["sine"]}, "no candidate"),
         ({"tests": CANDIDATES, "prior": {"rat": 1.0}}, "No parameter is named 'rat'"),
+        ({"tests": CANDIDATES, "law": Linear}, "`law` must be a law with its numbers, but is the class Linear"),
+        (
+            {"tests": CANDIDATES, "law": lambda velocity, force: Linear(1.0)},
+            "write the law with the numbers you expect",
+        ),
+        ({"tests": CANDIDATES, "rig": ["gas"]}, "`rig` must be a `Rig` with its numbers, but is a list of 1"),
+        ({"tests": CANDIDATES, "rig": Rig()}, r"Write those that the runs shall determine, `rig=Rig\(gas_force"),
+        ({"tests": []}, "`tests` must hold at least one test"),
+        (
+            {"tests": CANDIDATES, "limits": MachineLimits(0.005, 0.01)},
+            r"no candidate within them: 0 \(20 mm, 0.06283 m/s",
+        ),
+        ({"limits": MachineLimits(0.02, 0.5), "duration": -1.0}, "`duration` must be positive"),
+        ({"limits": MachineLimits(0.02, 0.5), "strokes": 0}, "`strokes` must be 1 or more"),
+        (
+            {"tests": CANDIDATES, "criterion": "c", "function": lambda law: law.rate * np.ones(2)},
+            r"`function` must return one number, but is one that returns an array of shape \(2,\)",
+        ),
+        ({"tests": CANDIDATES, "criterion": "c", "function": lambda law: {"rate": law.rate}}, "returns a dict of 1"),
     ],
 )
 def test_refusals(settings, match):
     with pytest.raises(ValueError, match=match):
-        design_experiment(
-            Linear(2000.0), **{"force_noise": 20.0, "sampling_rate": 500.0, "strokes": 2, "frequencies": 2} | settings
-        )
+        common = {"law": Linear(2000.0), "force_noise": 20.0, "sampling_rate": 500.0, "strokes": 2, "frequencies": 2}
+        design_experiment(**common | settings)
 
 
 def test_limits_refuse():
     with pytest.raises(ValueError, match="frequencies"):
         MachineLimits(0.02, 0.5, frequencies=(2.0, 1.0))
     assert dataclasses.replace(MachineLimits(0.02, 0.5), force=10.0).force == 10.0
+
+
+def test_tests_beyond_the_machine_are_left_out_and_named():
+    limits = MachineLimits(0.02, 0.3, force=400.0, frequencies=(0.5, 8.0))
+    tests = [
+        *CANDIDATES[:2],
+        SineTest(0.1, 5.0, name="long"),
+        TriangleTest(0.002, 6.0, name="sharp"),  # its turns are as sharp as those of a sine of 13.8 Hz
+        RandomTest(0.01, 0.1, duration=4.0, band=(0.5, 9.0), name="wide"),
+        CommandStep(SineTest(0.02, 0.2), (0.0, 1.0), name="slow"),
+        SineTest(0.015, 3.0, name="strong"),
+    ]
+    design = design_experiment(
+        Linear(2000.0), limits, runs=2, tests=tests, force_noise=10.0, sampling_rate=500.0, programme=tests[1:3]
+    )
+    assert {test.name.rstrip("_2") for test in design.tests} <= {"0", "1", "sharp"}
+    left_out, programme = design.warnings
+    assert left_out == (
+        "Left out of the candidates as beyond `limits`: long (100 mm, 3.142 m/s), wide (9 Hz), slow (0.2 Hz), "
+        "strong (565.5 N)."
+    )
+    assert programme.startswith("The machine cannot run 1 of the 2 tests of the programme: long (100 mm, 3.142 m/s, 6")
+    assert f"warning: {left_out}" in repr(design)
+
+
+def test_a_zero_is_judged_by_its_vector_its_prior_or_its_force():
+    def design(law, **settings):
+        return design_experiment(law, runs=1, tests=CANDIDATES, force_noise=20.0, sampling_rate=500.0, **settings)
+
+    table = design(Table([-0.3, -0.1, 0.0, 0.1, 0.3], [-500.0, -200.0, 0.0, 300.0, 700.0]), criterion="A")
+    assert table.warnings == ()  # known to 2 N beside 700 N
+    assert "not identifiable" not in repr(table)
+    gas = Linear(2000.0) + Spring(5000.0, 0.0)
+    assert design(gas).warnings == ()  # to 1 N beside forces of 500 N
+    (said,) = design(gas, prior={"preload": 0.1}).warnings
+    assert said == "The runs will not determine terms.1.preload."
+
+
+def test_a_command_that_is_held_is_said_and_one_that_varies_counts():
+    law = Scheduled((Linear(900.0), Linear(4900.0)), levels=[0.0, 2.0], command=0.5)
+    sine = SineTest(0.02, 1.0, name="held")
+
+    def design(*tests):
+        return design_experiment(law, runs=1, tests=tests, force_noise=20.0, sampling_rate=500.0)
+
+    weak, held = design(sine).warnings
+    assert weak == "The runs will not determine laws.0.rate, laws.1.rate."
+    assert held.startswith("All runs are at command 0.5 of 0 to 2, and say little or nothing of numbers that act at ")
+    best = design(sine, CommandStep(sine, (0.0, 2.0), name="steps"))
+    assert [test.name for test in best.tests] == ["steps"] and best.warnings == ()
+    assert max(best.standard_errors.values()) < 20.0

@@ -1,5 +1,6 @@
 """Gradient descent with early stopping: it finds what is there, stops in time, and gives the same again."""
 
+import dataclasses
 import json
 
 import jax
@@ -60,12 +61,20 @@ def test_hybrid_learns_a_hysteresis_that_it_does_not_contain_the_same_each_time(
     np.testing.assert_array_equal(result.history[:2], again.history)
 
 
+def test_a_training_without_a_better_step_says_so(lagged):
+    result = identify.train(Linear(1990.0), lagged[:1], held_out=lagged[1], steps=25, learning_rate=50.0)
+    assert result.best_step == 0 and float(get(result.law, "rate")) == 1990.0
+    said = "No step was better on `held_out` than the start, which is the result: lower `learning_rate` (50)"
+    assert result.warnings == (f"{said}, if it is no fit.",)
+
+
 def test_stops_when_the_held_out_error_grows(lagged):
     # ascent in small steps on the records held out: the first error is the best
     rising = optax.sgd(-1e-3)
     start = Lag(Linear(1900.0), 0.004)
     result = identify.train(start, lagged[:1], held_out=lagged[1], optimiser=rising, steps=1000, patience=50)
     assert result.best_step == 0 and result.steps[-1] == 50
+    assert result.warnings[0].startswith("No step was better on `held_out`") and "of `optimiser`" in result.warnings[0]
     assert "stopped at step 50, 50 steps after the held-out error last fell" in result.stopped
     np.testing.assert_allclose(get(result.law, "law.rate"), 1900.0, rtol=1e-9)
 
@@ -76,6 +85,25 @@ def test_a_record_of_infinite_weighting_is_not_trained_on(lagged):
     beside = identify.train(start, lagged[:2], weighting=[1.0, np.inf], **options)
     np.testing.assert_allclose(free_parameters(beside.law).values, free_parameters(alone.law).values, rtol=1e-6)
     np.testing.assert_allclose(beside.rmse, alone.rmse, rtol=1e-6)
+    assert "Lag trained on 1 record:" in repr(beside)
+    assert [row["use"] for row in beside.table().records()] == ["training", "scored only", "held out"]
+
+
+def test_records_with_errors_and_records_that_contradict_are_refused_as_in_a_fit(lagged):
+    start = Linear(1500.0)
+    clipped = dataclasses.replace(lagged[1], name="clipped", force=np.clip(lagged[1].force, -200.0, 200.0))
+    with pytest.raises(ValueError, match=r"`runs` must be records without errors, but is clipped.*leave_out"):
+        identify.train(start, [lagged[0], clipped], held_out=lagged[2], steps=25)
+    with pytest.raises(ValueError, match="`held_out` must be records without errors, but is clipped"):
+        identify.train(start, lagged[0], held_out=clipped, steps=25)
+    both, weights = [clipped, lagged[0]], [1.0, 2.0]
+    rest = identify.train(start, both, held_out=lagged[2], bad_records="leave_out", weighting=weights, steps=25)
+    assert [run.name for run in rest.runs] == [lagged[0].name]
+    kept = identify.train(start, both, held_out=lagged[2], bad_records="keep", steps=25)
+    assert len(kept.runs) == 2
+    hard = dataclasses.replace(lagged[0], name="hard", force=1.5 * lagged[0].force)
+    with pytest.raises(ValueError, match="`runs` must be records that one law can follow"):
+        identify.train(start, [lagged[0], hard], held_out=lagged[2], steps=25)
 
 
 def test_refusals(lagged):
@@ -84,6 +112,9 @@ def test_refusals(lagged):
         identify.train(start, lagged, held_out=[])
     with pytest.raises(ValueError, match="`held_out` must hold records that are not trained on"):
         identify.train(start, lagged, held_out=lagged[0])
+    copy = dataclasses.replace(lagged[0], name="copy")
+    with pytest.raises(ValueError, match=f"copy \\(the same as {lagged[0].name} of `runs`\\)"):
+        identify.train(start, lagged, held_out=copy)
     with pytest.raises(ValueError, match="`patience` must be 1 or more"):
         identify.train(start, lagged[:1], held_out=lagged[1], patience=0)
     with pytest.raises(ValueError, match="`learning_rate` must be positive"):
@@ -116,6 +147,16 @@ def test_the_learnt_rung_is_trained_without_the_record_it_stops_by(lagged, monke
         "law.terms.2.stiffness",
         "rig.force_offset",
     }
+
+
+def test_a_copy_of_a_record_is_not_what_a_learnt_start_stops_by(lagged, monkeypatch):
+    calls = []
+    monkeypatch.setattr("jaxdamp.identify.ladder.train", lambda law, runs, **how: calls.append((runs, how)))
+    copies = [dataclasses.replace(run, name=f"{run.name} again") for run in lagged[:2]]
+    identify.LearntStart(keys=1).trainings([*lagged, *copies])
+    ((rest, how),) = calls
+    assert len({run.fingerprint for run in (*rest, how["held_out"])}) == len(rest) + 1 == 3
+    assert how["bad_records"] == "keep"  # the fit around it has judged them
 
 
 @pytest.mark.slow
