@@ -239,18 +239,23 @@ def cross_validate(
         for number, (name, group, out) in enumerate(jobs, 1):
             members, names = groups[group], [groups[group][i].name for i in out]
             shown(f"{name} without {' and '.join(names)}, {number} of {len(jobs)}")
-            sigma = [np.inf if i in out else s for i, s in enumerate(weights(weighting, members))]
-            fitted = members
-            if options.get("per_record"):  # a record that is held out has no value of its own
-                fitted, sigma = (
-                    [value for i, value in enumerate(values) if i not in out] for values in (members, sigma)
-                )
+            fitted, sigma = _without(out, members, weights(weighting, members), bool(options.get("per_record")))
             result = method(laws[name], fitted, weighting=sigma, **options)
             scores = result.score(members)[2]
             for i, other in zip(out, names[::-1] if len(out) > 1 else [None], strict=True):
                 fold = Fold(name, group, scores[i].name, scores[i].fit_percent, scores[i].rmse, result, other)
                 (folds if other is None else inner).append(fold)
     return CrossValidation(tuple(folds), tuple(inner))
+
+
+def _without(
+    out: Sequence[int], members: Sequence[BenchRun], sigma: Sequence[float], own_values: bool
+) -> tuple[Sequence[BenchRun], list[float]]:
+    """What is fitted without some records, and the weighting: a record held out has no value of its own."""
+    if own_values:
+        left = [i for i in range(len(members)) if i not in out]
+        return [members[i] for i in left], [sigma[i] for i in left]
+    return members, [np.inf if i in out else s for i, s in enumerate(sigma)]
 
 
 def _grouped(

@@ -107,9 +107,7 @@ def sensitivity_to_records(
     implicit function theorem they change by −H⁻¹ ∂(Jᵀ r)/∂force, where H is the whole matrix of second derivatives.
     """
     problem = evidence.problem
-    if problem.noise_factor != 1.0 or any(isinstance(part, Priors) for part in problem.residuals):
-        remedy = "Fit with `loss='squares'` and without priors, whose weights depend on the residual."
-        _checks.refuse("result", "be a fit by plain least squares", f"one by {criterion}", remedy)
+    _refuse_weights(problem, criterion)
     minimum = _refined(problem, evidence.minimum.values)
     names, values, slopes = _function(evidence, function, minimum.values)
     scale = 1.0 / np.sqrt(np.diag(minimum.hessian)[minimum.moves])
@@ -145,6 +143,13 @@ def sensitivity_to_records(
         held=tuple(map(str, held)),
         warnings=warnings,
     )
+
+
+def _refuse_weights(problem: Problem, criterion: str) -> None:
+    """Refuse a fit whose weights depend on the residual; rest that is left out, or periodic records, do not."""
+    if problem.noise_factor != 1.0 or any(isinstance(part, Priors) for part in problem.residuals):
+        remedy = "Fit with `loss='squares'` and without priors, whose weights depend on the residual."
+        _checks.refuse("result", "be a fit by plain least squares", f"one by {criterion}", remedy)
 
 
 def _refined(problem: Problem, values: np.ndarray) -> _Minimum:
