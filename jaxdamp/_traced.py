@@ -58,7 +58,12 @@ def behind(value: object) -> np.ndarray | None:
 
 def is_traced(tree: PyTree) -> bool:
     """Whether JAX traces any leaf."""
-    return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(tree))
+    try:
+        leaves = jax.tree.leaves(tree)
+    except ValueError:  # JAX sorts the keys of a dictionary, which 1 and "ref" do not allow
+        parts = jax.tree.leaves(tree, is_leaf=lambda node: isinstance(node, dict))
+        return any(is_traced(list(part.values()) if isinstance(part, dict) else part) for part in parts)
+    return any(isinstance(leaf, Tracer) for leaf in leaves)
 
 
 def is_inside_program() -> bool:

@@ -4,6 +4,7 @@ import csv
 import functools
 import hashlib
 import os
+import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
@@ -12,8 +13,8 @@ from typing import final
 from jaxdamp import _checks
 from jaxdamp._files import FOLDER_SUFFIXES, natural_key
 from jaxdamp.bench.manifest import NAME
+from jaxdamp.bench.raw_tables import library
 from jaxdamp.bench.read import read
-from jaxdamp.bench.readers import library
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import BenchSet, as_runs
 
@@ -95,7 +96,7 @@ class DamperRecords(Mapping[str, tuple[BenchRun, ...]]):
             return self
         keys, stamps = zip(*self._dampers.values(), strict=True)
         read = functools.partial(_processed, self._read, steps)
-        return DamperRecords(read, keys, self._dampers, [f"{stamp} {steps}".strip() for stamp in stamps])
+        return DamperRecords(read, keys, self._dampers, [f"{stamp} {_said(steps)}".strip() for stamp in stamps])
 
     def part(self, names: Iterable[str]) -> "DamperRecords":
         """Some of the dampers."""
@@ -114,7 +115,8 @@ def read_dampers(paths: str | os.PathLike[str], *, each: str, **options: object)
     """The records of a production line: a folder tree or a table of files, of which each damper is read when needed.
 
     Hidden folders and files are left out. A `jaxdamp.toml` at the top says how all records are read, unless the folder
-    of a damper has its own. A file counts as changed if its size or its time of change is another.
+    of a damper has its own. A file counts as changed if its size or its time of change is another, and all do if they
+    are read in another way.
 
     Arguments:
         paths: a folder, with all folders in it, in natural order; or a table (.csv or .parquet) with the columns
@@ -149,9 +151,11 @@ def read_dampers(paths: str | os.PathLike[str], *, each: str, **options: object)
     if not files:
         raise FileNotFoundError(f"{top} holds no *.csv or other file of records.")
     common = (top if top.is_dir() else top.parent) / NAME
-    manifests = [_manifest(some[0].parent, common) for some in files.values()]
+    given, said = options.get("manifest"), _said(options)
+    own = Path(given).expanduser() if isinstance(given, str | os.PathLike) else None
+    manifests = [own or _manifest(some[0].parent, common) for some in files.values()]
     keys = list(zip(files.values(), manifests, strict=True))
-    stamps = [_stamp(some if manifest is None else [*some, manifest]) for some, manifest in keys]
+    stamps = [f"{_stamp(some if at is None else [*some, at])} {said}".strip() for some, at in keys]
     return DamperRecords(functools.partial(_read_damper, options), keys, files, stamps)
 
 
@@ -202,6 +206,11 @@ def _of_table(file: Path) -> dict[str, list[Path]]:
 def _manifest(folder: Path, common: Path) -> Path | None:
     """How the records of a damper are read: as the manifest in their folder says, or the one at the top."""
     return next((file for file in (folder / NAME, common) if file.is_file()), None)
+
+
+def _said(options: Mapping[str, object]) -> str:
+    """Keywords in words that are the same in every process and in any order; empty if there are none."""
+    return re.sub(r" at 0x\w+", "", str(dict(sorted(options.items())))) if options else ""
 
 
 def _stamp(files: Iterable[Path]) -> str:

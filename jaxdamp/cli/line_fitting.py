@@ -1,5 +1,6 @@
 """`jaxdamp fit` of a force-velocity table, and of every damper of a production line, with control charts."""
 
+import json
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -7,7 +8,7 @@ from pathlib import Path
 from jaxdamp import _checks, bench, dampers, export, identify
 from jaxdamp._checks import ArgumentError
 from jaxdamp.bench import BenchSet, DamperRecords, ForceVelocityTable
-from jaxdamp.blocks import import_zarr
+from jaxdamp.blocks import command_of, import_zarr, note_command
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.jobs import Output, job, write_tables
 from jaxdamp.cli.limits import bounds_in_si
@@ -110,8 +111,11 @@ def fit_line(
     if in_control is not None:
         _charts({"place": range(len(dampers))}, in_control)  # refuses too few or too many before anything is fitted
     with job(screen, "fit", output) as work:
+        store = output.store("fit")
+        asked = {"law": name, "rig": list(rig), "reading": str(reading)}
         with screen.stage("Reading the first damper"):
-            start = _start(dampers, name, rig)
+            start = _stored_start(store, asked) or _start(dampers, name, rig)
+        note = json.dumps({**asked, "start": export.to_json(start)})
         bounds = options.get("bounds")
         stated = bounds_in_si(bounds if isinstance(bounds, dict) else {}, [{"law": start, "rig": Rig()}])
         how = {**options, "bounds": stated, "rig": rig}
@@ -119,9 +123,13 @@ def fit_line(
         how["bad_records"] = "keep" if reading.keep_bad else skips
         title = f"Fitting {name} to {len(dampers)} dampers"
         with screen.stage(title) as advance, warnings.catch_warnings(action="ignore"):  # of dampers, which are remarks
-            how["progress"] = lambda done, total: advance(f"{done} of {total}", done)
+
+            def tell(done: int, total: int) -> None:
+                note_command(store, note)
+                advance(f"{done} of {total}", done)
+
             fitting: Callable[..., ManyFits] = identify.fit_many
-            many = fitting(start, dampers, file=output.store("fit"), **how)
+            many = fitting(start, dampers, file=store, progress=tell, **how)
         results = [many] if in_control is None else [many, _charts(many, in_control)]
         screen.answer(*(f"{result.summary}." for result in results))
         screen.remarks([text for result in results for text in result.warnings], style="yellow")
@@ -151,6 +159,13 @@ def _charts(numbers: ManyFits | Mapping[str, Sequence[float]], in_control: int) 
         return identify.control_charts(numbers, baseline=in_control)
     except ArgumentError as error:  # --baseline is another law
         raise ArgumentError(str(error).replace("`baseline`", "`in_control`"), argument="in_control") from error
+
+
+def _stored_start(store: Path, asked: Mapping[str, object]) -> AbstractDamper | None:
+    """The law that the fits in a store began with, if the same was asked for: another damper may be the first now."""
+    noted = json.loads(command_of(store) or "{}")
+    start = noted.pop("start", None)
+    return export.from_json(start) if start is not None and noted == asked else None
 
 
 def _start(dampers: DamperRecords, name: str, rig: Sequence[str]) -> AbstractDamper:

@@ -57,22 +57,45 @@ class Lanes(NamedTuple):
         used = self.used[damper]
         return [signal[place][used[place]] for place in self.problems[damper].places]
 
-    def noise(self, damper: int, residual: Float[np.ndarray, " samples"], free: float | int) -> float:
-        """Standard deviation of the weighted residual of a damper, larger where it is correlated unless it is known.
+    def variances(
+        self, damper: int, residual: Float[np.ndarray, " samples"], free: float | int
+    ) -> Float[np.ndarray, " records"]:
+        """Variance of the weighted residual in each record of a damper, larger where it is correlated unless known.
+
+        It is one for all records, or one for each if the problem weights them so or it is known.
 
         Arguments:
             damper: its number.
             residual: weighted.
             free: count of free numbers.
         """
-        problem, used = self.problems[damper], self.used[damper]
+        problem, parts = self.problems[damper], self.of_records(damper, residual)
         if self.force_noise is not None:
-            weights = self.force_noise / np.array(problem.sigma)[problem.owner[used]]
-            return float(np.sqrt(np.mean(weights**2)))
-        parts = self.of_records(damper, residual)
-        squares = sum(float(part @ part) for part in parts) / max(sum(part.size for part in parts) - free, 1)
+            return (self.force_noise / np.array(problem.sigma)) ** 2
+        squares, sizes = (np.array(each, float) for each in zip(*((p @ p, p.size) for p in parts), strict=True))
         alike = correlation_time(parts)
-        return problem.noise_factor * float(np.sqrt(squares * (alike if alike > CORRELATED else 1.0)))
+        wider = problem.noise_factor**2 * (alike if alike > CORRELATED else 1.0)
+        if not problem.each:
+            return np.full(sizes.shape, wider * np.sum(squares) / max(np.sum(sizes) - free, 1))
+        return wider * squares / np.maximum(sizes * (1.0 - free / np.sum(sizes)), 1)
+
+    def mean(self, damper: int, of_records: Float[np.ndarray, " records"]) -> float:
+        """The mean of a number of each record of a damper over its samples."""
+        sizes = [np.count_nonzero(part) for part in self.of_records(damper, self.used[damper])]
+        return float(np.average(of_records, weights=sizes))
+
+    def excess(
+        self, damper: int, here: Here, variances: Float[np.ndarray, " records"]
+    ) -> Float[np.ndarray, "free free"]:
+        """The products of columns as in `Searches.products`, with the variances beyond the least as weights.
+
+        Priors count with the mean variance.
+        """
+        beyond = np.full(len(here.whole), self.mean(damper, variances) - variances.min())
+        for place, variance in zip(self.problems[damper].places, variances, strict=True):
+            beyond[place] = variance - variances.min()
+        noisy = np.sqrt(np.maximum(beyond, 0.0))[:, None] * here.whole[:, :-1] @ here.units
+        return noisy.T @ noisy / self.problems[damper].level ** 2
 
 
 def by_rounds(
@@ -96,7 +119,7 @@ def by_rounds(
         noise = np.ones(len(y))
         for i in map(int, np.flatnonzero(moving)):
             residual = lanes.searches[i].here(y[i]).whole[:, -1]
-            noise[i] = lanes.noise(i, residual, free)
+            noise[i] = np.sqrt(lanes.mean(i, lanes.variances(i, residual, free)))
             after = rounds[i].after(plain.problems[i], residual, noise[i], loss)
             moving[i], rounds[i] = after is not None, after or rounds[i]
         if not np.any(moving):
@@ -122,20 +145,23 @@ def by_rounds(
 def judged(lanes: Lanes, end: SearchLanes, depends: Dependence | None) -> dict[str, Any]:
     """Numbers of each damper with standard errors, errors of it and of each of its records, and drift of states."""
     count, free = end.y.shape
-    percent, rmse, drift, noise = (np.zeros(count) for _ in range(4))
-    values, units, by_record = np.zeros((count, free)), np.zeros((count, free, free)), list[np.ndarray]()
+    percent, rmse, drift = (np.zeros(count) for _ in range(3))
+    values, by_record, noise = np.zeros((count, free)), list[np.ndarray](), list[_Noise]()
     for i, problem in enumerate(lanes.problems):
         here = lanes.searches[i].here(end.y[i])
-        residual, values[i], units[i] = here.whole[:, -1], here.values, here.units
+        values[i] = here.values
         batches = [part for part in problem.residuals if isinstance(part, Batch)]
-        noise[i] = (lanes.noise(i, residual, free if depends is None else depends.size / count) / problem.level) ** 2
+        variances = lanes.variances(i, here.whole[:, -1], free if depends is None else depends.size / count)
+        variances /= problem.level**2
+        whole = lanes.searches[i].products(here)[:-1, :-1]
+        noise.append(_Noise(here.units, whole, float(variances.min()), lanes.excess(i, here, variances)))
         periodic = [batch for batch in batches if batch.cycle is not None]
         drift[i] = max(
             [float(_drift(problem.free, jnp.asarray(here.values), batch)) for batch in periodic], default=0.0
         )
         percent[i], rmse[i], each = _errors(lanes, i, batches, here, settled=drift[i] <= DRIFT)
         by_record.append(each)
-    errors_of_numbers = _standard_errors(end, units, depends, noise)
+    errors_of_numbers = _standard_errors(end, noise, depends)
     named = {"values": values, "standard_errors": errors_of_numbers, "fit_percent": percent, "rmse": rmse}
     return named | {"record_rmse": tuple(by_record), "drift": drift}
 
@@ -151,7 +177,9 @@ def _errors(
     problem = lanes.problems[damper]
     averaged = any(dt * run.sampling_rate > 1.5 for dt, run in zip(problem.sample_steps, problem.runs, strict=True))
     if averaged and settled:
-        percent, rmse, scores = score(problem.free.build(here.values), problem.runs, None, problem.initial_state)
+        percent, rmse, scores = score(
+            problem.free.build(jnp.asarray(here.values)), problem.runs, None, problem.initial_state
+        )
         return percent, rmse, np.array([of_record.rmse for of_record in scores])
     signals = (np.concatenate([np.ravel(getattr(b, name)) for b in batches]) for name in ("weight", "force"))
     missed, weight, force = (lanes.of_records(damper, signal) for signal in (here.whole[:, -1], *signals))
@@ -167,32 +195,60 @@ def _drift(free: FreeParameters, values: Float[Array, " free"], batch: Batch) ->
     return jnp.max(batch.settled_forces(free.build(values))[1])
 
 
+class _Noise(NamedTuple):
+    """What the standard errors of a damper follow from, at its end."""
+
+    units: Float[np.ndarray, "free free"]  # derivatives of the numbers by the coordinates
+    products: Float[np.ndarray, "free free"]  # of the columns of the Jacobian by the coordinates
+    least: float  # variance of a record, relative to the level of the damper
+    excess: Float[np.ndarray, "free free"]  # the products, weighted by the variances beyond the least
+
+    def beyond(self, least: float) -> Float[np.ndarray, "free free"]:
+        """The products, weighted by the variances beyond a lower one."""
+        return self.excess + (self.least - least) * self.products
+
+
 def _standard_errors(
-    end: SearchLanes,
-    units: Float[np.ndarray, "dampers free free"],
-    depends: Dependence | None,
-    noise: Float[np.ndarray, " dampers"],
+    end: SearchLanes, noise: Sequence[_Noise], depends: Dependence | None
 ) -> Float[np.ndarray, "dampers free"]:
-    """Standard errors of the numbers of each damper.
+    """Standard errors of the numbers of each damper: (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹ with the variance Σ of each record.
 
     Arguments:
         end: of each damper.
-        units: derivatives of the numbers by the coordinates.
+        noise: of each damper.
         depends: how dampers depend on shared numbers.
-        noise: variance relative to the level of each damper.
     """
-    products, (count, free) = end.aux, end.y.shape
-    inverse = [_inverse(of_damper[:-1, :-1]) for of_damper in (products if depends is None else products[:1])]
+    count, free = end.y.shape
+    if depends is None:
+        each = [_covariance(end.aux[i], one.least, one.excess) for i, one in enumerate(noise)]
+    else:
+        least, beyond = min(one.least for one in noise), np.zeros((depends.size, depends.size))
+        for i, one in enumerate(noise):
+            columns, rows = depends.rows(i)
+            beyond[np.ix_(columns, columns)] += rows.T @ one.beyond(least) @ rows
+        each = [_covariance(end.aux[0], least, beyond)] * count
     errors = np.zeros((count, free))
-    for i in range(count):
+    for i, (covariance, lost) in enumerate(each):
         columns, rows = (np.arange(free), np.eye(free)) if depends is None else depends.rows(i)
-        variances, lost = inverse[i if depends is None else 0]
-        variance = noise[i] if depends is None else float(np.mean(noise))
-        to_values = units[i] @ rows
-        covariance = variance * to_values @ variances[np.ix_(columns, columns)] @ to_values.T
+        to_values = noise[i].units @ rows
+        variances = np.diag(to_values @ covariance[np.ix_(columns, columns)] @ to_values.T)
         undetermined = np.any(lost[columns] & (to_values != 0), axis=1)
-        errors[i] = np.where(undetermined, np.inf, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
+        errors[i] = np.where(undetermined, np.inf, np.sqrt(np.maximum(variances, 0.0)))
     return errors
+
+
+def _covariance(
+    products: Float[np.ndarray, "columns columns"], least: float, beyond: Float[np.ndarray, "free free"]
+) -> tuple[Float[np.ndarray, "free free"], Bool[np.ndarray, " free"]]:
+    """The covariance of coordinates, and which take part in directions that change no force.
+
+    Arguments:
+        products: of the columns of the Jacobian and the residual.
+        least: variance that every sample has.
+        beyond: the products, weighted by the variances beyond it.
+    """
+    inverse, lost = _inverse(products[:-1, :-1])
+    return least * inverse + inverse @ beyond @ inverse, lost
 
 
 def _inverse(products: Float[np.ndarray, "free free"]) -> tuple[np.ndarray, np.ndarray]:

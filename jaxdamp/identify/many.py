@@ -30,6 +30,7 @@ from jaxdamp.identify.many_records import (
     begun_on,
     by_name,
     fitted_records,
+    left_out_in_words,
     refuse_several_laws,
 )
 from jaxdamp.identify.many_result import ManyFits
@@ -117,12 +118,15 @@ def fit_many(
     by_names = by_name(dampers)
     if file is not None or cluster is not None:
         return fit_into_store(law, by_names, stated, file, cluster, progress, shared=bool(shared), options=how)
-    records = {name: fitted_records(name, runs, how) for name, runs in by_names.items()}
+    given = dict(by_names)  # which reads them, once
+    records = {name: fitted_records(name, runs, how) for name, runs in given.items()}
     some = list(records.values())[:: -(-len(records) // STARTED_FROM)]
     begin = begun_on(law, [run for runs in some for run in runs], how, shared)
     for name, runs in records.items():
         refuse_several_laws(name, runs, begin.model, how)
-    return fitted_together(begin, records, how, shared, stated)
+    lacking = [[run.name for run in runs if run not in records[name]] for name, runs in given.items()]
+    many = fitted_together(begin, records, how, shared, stated)
+    return dataclasses.replace(many, reasons=tuple(map(left_out_in_words, lacking)))
 
 
 @one_thread()

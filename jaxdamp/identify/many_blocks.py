@@ -1,5 +1,6 @@
 """`fit_many` in blocks of dampers into a Zarr store, which many processes can fill and later calls go on with."""
 
+import dataclasses
 import hashlib
 import json
 import os
@@ -11,20 +12,32 @@ from typing import Any, final, overload
 import jax
 import numpy as np
 from filelock import FileLock
+from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._status import Status
 from jaxdamp._warned import warn
 from jaxdamp.bench import BenchRun, DamperRecords
 from jaxdamp.blocks import AbstractWork, Blocks, BlockStore, Cluster, Variable, fill, stored_blocks
-from jaxdamp.identify.many_records import AllRecords, Options, begun_on, fitted_records, refuse_several_laws
+from jaxdamp.identify.many_records import (
+    AllRecords,
+    Options,
+    begun_on,
+    fitted_records,
+    left_out_in_words,
+    refuse_several_laws,
+)
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.preparing import Beginning
 from jaxdamp.identify.starting import Start
+from jaxdamp.identify.stated import followed_channels, stated_parameters, stated_values
+from jaxdamp.parameters import with_values
+from jaxdamp.rig import Rig
 
 
 BLOCK = 64  # dampers: some seconds of work, and few enough records for any memory
 ABSENT = "Its records were not among those of the call that came to its block."
+AGAIN = "The next call tries it again."  # at the end of a reason that may pass
 FLOAT = np.dtype(np.float64)
 OF_EACH = ("values", "standard_errors", "bias")  # of each parameter of each damper
 NUMBERS = ("fit_percent", "rmse", "drift", "share_left_out")  # of each damper, beside those of its parameters
@@ -37,35 +50,42 @@ class DamperFits(AbstractWork):
     Arguments:
         beginning: of all fits.
         options: of `fit_many`.
+        first: a record that they begin with.
         records: of the dampers by name.
-        names: of the dampers by row; rows without one stay empty.
+        names: of the dampers by row, empty for those of other calls; rows without one stay empty.
     """
 
-    def __init__(self, beginning: Beginning, options: Options, records: AllRecords, names: Mapping[int, str]) -> None:
-        self._beginning, self._options = beginning, options
+    def __init__(
+        self, beginning: Beginning, options: Options, first: BenchRun, records: AllRecords, names: Mapping[int, str]
+    ) -> None:
+        self._beginning, self._options, self._first = beginning, options, first
         self._records, self._names = records, names
 
     def part(self, indices: np.ndarray) -> "DamperFits":
         """The work of some rows, with the records of their dampers, or what reads them."""
         names = {row: self._names[row] for row in map(int, indices) if row in self._names}
-        there = [name for name in names.values() if name in self._records]
-        return DamperFits(self._beginning, self._options, _part(self._records, there), names)
+        records = _part(self._records, filter(None, names.values()))
+        return DamperFits(self._beginning, self._options, self._first, records, names)
 
     def compute(self, indices: np.ndarray) -> Mapping[str, np.ndarray]:
         """The fits of some rows as they are stored; a damper that cannot be read or fitted is left out, with why."""
-        results = self.without_results(indices, "")
-        places = {self._names[row]: place for place, row in enumerate(map(int, indices)) if row in self._names}
+        results = self.without_results(indices, ABSENT)
+        places = {name: place for place, row in enumerate(map(int, indices)) if (name := self._names.get(row))}
         good: dict[str, tuple[BenchRun, ...]] = {}
+        lacking: dict[str, list[str]] = {}
         for name, place in places.items():
+            results["reason"][place] = ""
             try:
-                good[name] = self._checked(name)
+                good[name], lacking[name] = self._checked(name)
             except MemoryError:
                 raise
             except Exception as error:
-                results["reason"][place] = _sentence(error)
+                results["reason"][place] = _reason(error)
         for name, row in self._fitted(good).items():
             for variable, value in row.items():
                 results[variable][places[name]] = value
+            if not row.get("reason"):
+                results["record_rmse"][places[name]] = json.dumps([*row["record_rmse"], *lacking[name]])
         results["failed"][:] = results["reason"] != ""
         return results
 
@@ -79,15 +99,16 @@ class DamperFits(AbstractWork):
         reasons = np.where(named, reason, "").astype(object)
         return {**empty, "steps": np.zeros(size, np.int32), **texts, "failed": reasons != "", "reason": reasons}
 
-    def _checked(self, name: str) -> tuple[BenchRun, ...]:
-        """The records of a damper that its fit takes."""
-        if name not in self._records:
-            raise ValueError(ABSENT)
-        runs = fitted_records(name, self._records[name], self._options)
-        refuse_several_laws(name, runs, self._beginning.model, self._options)
-        return runs
+    def _checked(self, name: str) -> tuple[tuple[BenchRun, ...], list[str]]:
+        """The records of a damper that its fit takes, and the names of those that are left out."""
+        records = self._records[name]
+        runs, model = fitted_records(name, records, self._options), self._beginning.model
+        refuse_several_laws(name, runs, model, self._options)
+        for stated in (stated_values, followed_channels):  # what only some dampers state is refused as in memory
+            stated(model, (self._first, *runs))
+        return runs, [run.name for run in records if run not in runs]
 
-    def _fitted(self, records: AllRecords) -> dict[str, dict[str, object]]:
+    def _fitted(self, records: AllRecords) -> dict[str, dict[str, Any]]:
         """What is stored of each damper; if the fit of all together raises, those of its halves, to leave one out."""
         from jaxdamp.identify.many import fitted_together  # of `fit_many`, which hands its blocks to this file
 
@@ -100,20 +121,20 @@ class DamperFits(AbstractWork):
             raise
         except Exception as error:
             if len(names) == 1:
-                return {names[0]: {"reason": _sentence(error)}}
+                return {names[0]: {"reason": _reason(error)}}
             halves = (names[: len(names) // 2], names[len(names) // 2 :])
             return {k: row for half in halves for k, row in self._fitted({n: records[n] for n in half}).items()}
         return {name: _row(many, place) for place, name in enumerate(names)}
 
 
-def _row(many: ManyFits, place: int) -> dict[str, object]:
-    """What is stored of a damper."""
-    row: dict[str, object] = {
+def _row(many: ManyFits, place: int) -> dict[str, Any]:
+    """What is stored of a damper, errors of its records as a list."""
+    row: dict[str, Any] = {
         name: getattr(many, name)[place] for name in ("values", "standard_errors", "fit_percent", "rmse", "steps")
     }
     row |= {name: array[place] for name in ("drift", "share_left_out") if (array := getattr(many, name)).size}
     row |= {} if many.bias is None else {"bias": many.bias[place]}
-    errors = json.dumps(many.record_rmse[place].tolist() if many.record_rmse else [])
+    errors = many.record_rmse[place].tolist() if many.record_rmse else []
     return row | {"status": many.status[place].name.lower(), "record_rmse": errors}
 
 
@@ -141,13 +162,17 @@ def fit_into_store(
         options: of the call besides.
     """
     place = _checked_path(path, len(records), settings, shared)
-    beginning = begun_on(law, _first_readable(records, options), options)
-    store, rows = _rows(place, _identity(beginning, options), records, len(beginning.free.names))
-    names = {row: name for row, name in enumerate(store.read("name")["name"]) if name}
-    fill(store, DamperFits(beginning, options, records, names), cluster, progress, "Fitting", "rows for dampers")
+    name, runs = _first_readable(records, options)
+    beginning = begun_on(law, runs, options)
+    store, rows = _rows(place, _identity(beginning, runs, options), records, len(beginning.free.names))
+    names = {row: "" for row, name in enumerate(store.read("name")["name"]) if name}
+    names |= dict(zip(map(int, rows), records, strict=True))
+    shortest = min(runs, key=len)
+    first = dataclasses.replace(shortest, name=f"{shortest.name} of {name!r}, with which the fits begin")
+    fill(store, DamperFits(beginning, options, first, records, names), cluster, progress, "Fitting", "rows for dampers")
     return ManyFits(
         names=tuple(records),
-        records=RecordsInOrder(records),
+        records=RecordsInOrder(records, options),
         settings=settings,
         free=beginning.free,
         options={**options, "bad_records": "keep"},
@@ -183,20 +208,25 @@ def _found(store: BlockStore, rows: np.ndarray, names: tuple[str, ...]) -> dict[
         some = ", ".join(left[:5]) + ", …" * (len(left) > 5)
         words = f"{len(left)} of {len(names)} dampers were left out: {some}. `many.remarks` says why."
         warn(words)
-    not_done = [
-        reason or "its block is not done yet" * (s is Status.LEFT_OUT)
-        for reason, s in zip(reasons, status, strict=True)
-    ]
-    errors = tuple(np.array(json.loads(text or "[]"), float) for text in found["record_rmse"])
-    return found | {"status": status, "reasons": tuple(not_done), "record_rmse": errors}
+    errors, without = zip(*map(_of_records, found["record_rmse"]), strict=True)
+    pending = ["its block is not done yet" * (s is Status.LEFT_OUT) for s in status]
+    said = tuple(next(filter(None, words), "") for words in zip(reasons, without, pending, strict=True))
+    return found | {"status": status, "reasons": said, "record_rmse": errors}
+
+
+def _of_records(text: str) -> tuple[Float[np.ndarray, " records"], str]:
+    """The errors of the records of a damper as they are stored, and what is said of those that were left out."""
+    stored = json.loads(text or "[]")  # numbers, then the names of those that were left out
+    errors = np.array([error for error in stored if not isinstance(error, str)], float)
+    return errors, left_out_in_words([name for name in stored if isinstance(name, str)])
 
 
 @final
 class RecordsInOrder(Sequence[tuple[BenchRun, ...]]):
-    """The records of dampers in their order, read when they are asked for."""
+    """The records of dampers in their order, read when they are asked for; without bad ones that a fit leaves out."""
 
-    def __init__(self, records: AllRecords) -> None:
-        self._records, self._names = records, tuple(records)
+    def __init__(self, records: AllRecords, options: Options) -> None:
+        self._records, self._options, self._names = records, options, tuple(records)
 
     def __len__(self) -> int:
         return len(self._names)
@@ -208,8 +238,10 @@ class RecordsInOrder(Sequence[tuple[BenchRun, ...]]):
     def __getitem__(self, place: int | slice) -> "tuple[BenchRun, ...] | RecordsInOrder":
         """The records of a damper, or of those of a slice."""
         if isinstance(place, slice):
-            return RecordsInOrder(_part(self._records, self._names[place]))
-        return self._records[self._names[place]]
+            return RecordsInOrder(_part(self._records, self._names[place]), self._options)
+        name = self._names[place]
+        runs = self._records[name]
+        return fitted_records(name, runs, self._options) if self._options["bad_records"] == "leave_out" else runs
 
 
 def _rows(path: Path, identity: Mapping[str, str], records: AllRecords, count: int) -> tuple[BlockStore, np.ndarray]:
@@ -238,9 +270,10 @@ def _rows(path: Path, identity: Mapping[str, str], records: AllRecords, count: i
 
 
 def _places(store: BlockStore) -> dict[tuple[str, str], int]:
-    """The row of each damper with its stamp; those whose block was come to without their records have none."""
+    """The row of each damper with its stamp; those without a fit for a reason that may pass have none."""
     columns = zip(*store.read("name", "stamp", "reason").values(), strict=True)
-    return {(str(n), str(s)): row for row, (n, s, reason) in enumerate(columns) if n and reason != ABSENT}
+    again = (ABSENT, AGAIN)
+    return {(str(n), str(s)): row for row, (n, s, why) in enumerate(columns) if n and not str(why).endswith(again)}
 
 
 def _known(stamps: Mapping[str, str]) -> dict[str, np.ndarray]:
@@ -258,6 +291,7 @@ def _stamp(records: AllRecords, name: str) -> str:
     for run in records[name]:
         for channel in (run.time, run.stroke, run.velocity, run.force, run.temperature, run.commands):
             digest.update(b"-" if channel is None else np.ascontiguousarray(channel).tobytes())
+        digest.update(repr((sorted(run.settings.items()), run.stroke_is_integrated, run.command_unit)).encode())
     return digest.hexdigest()[:16]
 
 
@@ -265,9 +299,22 @@ def _part(records: AllRecords, names: Iterable[str]) -> AllRecords:
     return records.part(names) if isinstance(records, DamperRecords) else {name: records[name] for name in names}
 
 
-def _identity(beginning: Beginning, options: Options) -> dict[str, str]:
-    """What fits belong to: start and options, as texts."""
-    leaves, structure = jax.tree.flatten(beginning.free.tree)
+def _identity(beginning: Beginning, runs: Sequence[BenchRun], options: Options) -> dict[str, str]:
+    """What fits belong to: start and options, as texts.
+
+    Numbers that come from the records of the first damper are left out, except of a law class: another damper may be
+    the first later. They are those that records state, and where the search of a machine begins that effects name.
+
+    Arguments:
+        beginning: of all fits.
+        runs: the records that it comes from.
+        options: of the call.
+    """
+    free, named = beginning.free, not isinstance(options["rig"], Rig)
+    from_records = np.array([named and p.path.startswith("rig.") for p in free.owners], bool)
+    tree = free.started_at(np.where(from_records, 0.0, free.values)).tree
+    tree = with_values(tree, dict.fromkeys(stated_parameters(beginning.model, runs), 0.0))
+    leaves, structure = jax.tree.flatten(tree)
     digest = hashlib.sha256(re.sub(r" at 0x\w+", "", str(structure)).encode())
     for leaf in leaves:
         digest.update(np.asarray(leaf).tobytes() if isinstance(leaf, jax.Array | np.ndarray) else repr(leaf).encode())
@@ -286,12 +333,17 @@ def _sentence(error: Exception) -> str:
     return text if isinstance(error, ValueError | OSError) and text else f"{type(error).__name__}: {text}"
 
 
-def _first_readable(records: AllRecords, options: Options) -> tuple[BenchRun, ...]:
-    """The records of the first damper that can be read, from which a law class starts."""
+def _reason(error: Exception) -> str:
+    """Why a damper is left out, as it is stored; what a system of files or a network says may pass."""
+    return f"{_sentence(error)} {AGAIN}" if isinstance(error, OSError) else _sentence(error)
+
+
+def _first_readable(records: AllRecords, options: Options) -> tuple[str, tuple[BenchRun, ...]]:
+    """The first damper that can be read and its records, from which a law class starts."""
     why = ""
     for name in records:
         try:
-            return fitted_records(name, records[name], options)
+            return name, fitted_records(name, records[name], options)
         except Exception as error:
             why = why or f"{name}: {_sentence(error)}"
     _checks.refuse("dampers", "hold one whose records can be read", f"{len(records)} dampers without ({why})")

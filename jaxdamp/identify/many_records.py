@@ -1,5 +1,6 @@
 """The records of many dampers: what a call gives as such, what a fit takes of them, and where all fits start."""
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
@@ -37,6 +38,10 @@ def by_name(dampers: object) -> AllRecords:
         _checks.refuse("dampers", "be the records of each damper", _checks.described(dampers), f"The call is `{CALL}`.")
     if not pairs:
         _checks.refuse("dampers", "hold at least one damper", "empty")
+    name, times = Counter(name for name, _ in pairs).most_common(1)[0]
+    if times > 1 or any(name == "" for name, _ in pairs):
+        is_ = f"{times} times {name!r}" if times > 1 else "''"
+        _checks.refuse("dampers", "have names that are different as texts and not empty", is_, "Rename one of them.")
     return {name: as_runs(runs, f"dampers[{name!r}]") for name, runs in pairs}
 
 
@@ -55,6 +60,15 @@ def fitted_records(name: str, runs: tuple[BenchRun, ...], options: Options) -> t
     if not any(np.ptp(run.force) > 0 for run in runs):
         _checks.refuse(argument, "hold records with a force that varies", f"{len(runs)} without")
     return usable(runs, options["bad_records"], robust=options["loss"] != "squares", argument=argument)
+
+
+def left_out_in_words(names: Sequence[str]) -> str:
+    """What is said of a damper some of whose records were left out because of an error; empty if none were.
+
+    Arguments:
+        names: of these records.
+    """
+    return f"it was fitted without {', '.join(map(repr, names))}: records with an error" if names else ""
 
 
 def refuse_several_laws(name: str, runs: tuple[BenchRun, ...], model: Model, options: Options) -> None:

@@ -60,7 +60,7 @@ class ManyFits(AbstractResult):
             periodic solution.
         bias: of the values by the noise of stroke and velocity, if `input_noise` was given.
         options: of the call, for `fit` of one damper.
-        reasons: of fits in a store, why a damper was left out; empty for the others.
+        reasons: why each damper, in a store, or which of its records were left out; empty for most.
     """
 
     names: tuple[str, ...]
@@ -195,7 +195,14 @@ class ManyFits(AbstractResult):
         good = (Status.CONVERGED, Status.LEFT_OUT)
         texts: list[list[str]] = [[] if s in good else [s.sentence] for s in self.status]
         for i, reason in enumerate(self.reasons):
-            texts[i] += [f"it was left out: {reason}"] if reason else []
+            words = f"it was left out: {reason}" if self.status[i] is Status.LEFT_OUT else reason
+            texts[i] += [words] if reason else []
+        if self._fitted.size:
+            self._compare(texts)
+        return tuple("; ".join([*text, *self._biased(i)]) for i, text in enumerate(texts))
+
+    def _compare(self, texts: list[list[str]]) -> None:
+        """Add to the remark on each damper in what it differs from the others that were fitted."""
         fitted = self._fitted
         settings = None if self.settings is None else tuple(np.array(self.settings)[fitted])
         for i in np.flatnonzero(self.drift > DRIFT):
@@ -217,7 +224,6 @@ class ManyFits(AbstractResult):
                 unit = f" {self.free.owners[j].unit}".rstrip()
                 suggested = f"{expected[k]:.4g}{unit}"
                 texts[fitted[k]].append(f"{name} = {values[k]:.4g}{unit} where the others suggest {suggested}")
-        return tuple("; ".join([*text, *self._biased(i)]) for i, text in enumerate(texts))
 
     def _biased(self, i: int) -> list[str]:
         """The numbers of a damper that the noise of stroke and velocity biases by more than their standard errors."""
@@ -289,6 +295,8 @@ class ManyFits(AbstractResult):
     def summary(self) -> str:
         """Law, number of dampers and errors."""
         at, law = self._fitted, type(law_of(self.free.tree)).__name__
+        if not at.size:
+            return f"{law}: none of {len(self)} dampers was fitted: {self.reasons[0]}"
         left = f", {len(self) - at.size} of them left out" if at.size < len(self) else ""
         errors = f": mean fit {np.mean(self.fit_percent[at]):.1f} %, RMSE up to {np.max(self.rmse[at]):.4g} N"
         return f"{law} fitted to {len(self)} dampers{left}{errors}"

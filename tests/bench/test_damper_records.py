@@ -58,6 +58,30 @@ def test_how_to_read_stands_at_the_top_or_with_the_damper(tree, tmp_path):
     assert rate(read_dampers(tree, each="folder", units={"force": "kN"})["day 9/damper 1"]) == 1001e3
 
 
+def test_another_way_of_reading_changes_every_stamp(tree, tmp_path):
+    def stamps(**options: Any) -> tuple[str, ...]:
+        dampers = read_dampers(tree, each="folder", **options)
+        return tuple(map(dampers.stamp, dampers))
+
+    (tmp_path / "how.toml").write_text('units = {force = "N"}\n')
+    ways: list[dict[str, Any]] = [
+        {},
+        {"units": {"force": "N"}},
+        {"units": {"force": "lbf"}},
+        {"sign": "compression-positive", "gains": {"force": 2.0}},
+        {"manifest": tmp_path / "how.toml"},
+        {"readers": {".x": lambda file: file}},
+    ]
+    found = [stamps(**way) for way in ways]
+    assert len({stamp for each in found for stamp in each}) == 4 * len(ways)
+    assert stamps(gains={"force": 2.0}, sign="compression-positive") == found[3]
+    assert stamps(readers={".x": lambda file: file}) == found[5]
+    (tmp_path / "how.toml").write_text('units = {force = "lbf"}\n')
+    assert not {*stamps(**ways[4])} & {*found[4]}
+    processed = read_dampers(tree, each="folder", sign="rebound-positive").process(moving=True)
+    assert processed.stamp("day 9/damper 1").endswith("{'sign': 'rebound-positive'} {'moving': True}")
+
+
 def test_a_table_of_files_gives_names_and_order(tree, tmp_path):
     import pyarrow
     import pyarrow.parquet

@@ -54,6 +54,20 @@ def test_a_line_is_fitted_and_charted_and_later_only_what_is_new(line: Path) -> 
     assert "out of control at the end" in page and "No 11" in page and (out / "result.png").is_file()
 
 
+def test_another_damper_may_be_the_first_of_a_line_later(tmp_path: Path) -> None:
+    line, out = tmp_path / "line", tmp_path / "out"
+    for i in (1, 2):
+        made(line, i)
+    words = ["fit", line, "--each", "folder", "--law", "bilinear", "--out", out]
+    jaxdamp(*words)
+    made(line, 0, more=200.0)
+    assert "Bilinear fitted to 3 dampers: mean" in " ".join(jaxdamp(*words, "--replace").output.split())
+    names = zarr.open_group(tmp_path / "out.zarr", mode="r")["name"]
+    assert [str(name) for name in np.asarray(names) if name] == ["No 2", "No 3", "No 1"]
+    said = " ".join(jaxdamp(*words, "--replace", "--cycles", "1", code=2).output.split())
+    assert "holds other work: start is Bilinear" in said
+
+
 def test_without_the_library_of_stores_it_says_so_before_it_reads(line: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "zarr", None)
     said = jaxdamp("fit", line, "--each", "folder", *LIMITS, "--out", line.with_name("out"), code=2).output

@@ -73,6 +73,27 @@ def test_records_cut_out_of_a_long_motion_start_in_the_periodic_solution():
     assert drifting.remarks[1] == "its states are not periodic: over a cycle they still change by 0.01"
 
 
+@pytest.mark.parametrize("options", [{}, {"force_noise": 4.0}, {"shared": ["*_rate", "lag_time"]}], ids=str)
+def test_standard_errors_where_records_weigh_alike_are_those_of_single_fits(options):
+    tests = [SineTest(0.02, 0.2, cycles=2), SineTest(0.02, 2.0)]  # the force of one is ten times that of the other
+    law, shared = Lag(Bilinear(2400.0, 1200.0), 4e-3), "shared" in options
+    dynos = [VirtualDyno(law, force_noise=4.0, sampling_rate=200.0, seed=seed) for seed in range(2)]
+    dampers = {str(i): list(dyno.run(tests)) for i, dyno in enumerate(dynos)}
+    many = fit_many(LAGGING, dampers, weighting="runs", **options)
+    every = [run for runs in dampers.values() for run in runs] if shared else dampers["0"]
+    alike: dict[str, Any] = {"bad_records": "keep"} if shared else options
+    single = fit(LAGGING, every, weighting="runs", starts=1, **alike)
+    errors = [e.standard_error for e in single.parameters]
+    np.testing.assert_allclose(many.standard_errors[0], errors, rtol=0.05)
+
+
+def test_each_damper_beside_a_shared_number_has_its_own_noise():
+    dynos = [VirtualDyno(Bilinear(2400.0, 1200.0), force_noise=noise, sampling_rate=200.0) for noise in (2.0, 20.0)]
+    dampers = [list(dyno.run(TESTS)) for dyno in dynos]
+    errors = [fit_many(Bilinear, dampers, shared=shared).standard_errors[:, 0] for shared in ((), ["compression_rate"])]
+    np.testing.assert_allclose(*errors, rtol=0.05)
+
+
 @pytest.mark.parametrize("start", [Bilinear, Lag(Bilinear(1500.0, 1500.0), 2e-3)], ids=["memoryless", "with a state"])
 def test_errors_are_those_of_the_samples_where_their_means_are_fitted(start):
     dyno = VirtualDyno(Bilinear(2400.0, 1200.0), force_noise=20.0, sampling_rate=4000.0)
@@ -160,6 +181,11 @@ def test_several_starts_side_by_side(clicks):
     assert fit_many(start, [clicks["0"]], rig="gas", max_steps=3, starts=4).rmse[0] <= few.rmse[0]
 
 
+def test_names_may_be_numbers_and_texts(clicks):
+    mixed: dict[Any, list[BenchRun]] = {1: clicks["0"], "reference": clicks["2"]}
+    assert fit_many(Bilinear, mixed).names == ("1", "reference")
+
+
 def test_dampers_with_commands():
     law = Scheduled((Linear(1000.0), Linear(3000.0)), [0.0, 2.0], 0.0)
     dampers = [
@@ -184,6 +210,9 @@ def test_what_is_refused(clicks):
             fit_many(Bilinear, clicks, **options)
     with pytest.raises(ValueError, match="`dampers` must hold at least one damper"):
         fit_many(Bilinear, {})
+    for names in ({1: clicks["0"], "1": clicks["2"]}, {"": clicks["0"]}):
+        with pytest.raises(ValueError, match="`dampers` must have names that are different as texts and not empty"):
+            fit_many(Bilinear, names)
     assert identify.ManyFits is type(fit_many(Bilinear, [clicks["0"]]))
 
 

@@ -1,5 +1,7 @@
 """Fits of many dampers in blocks into a store: those of one call in memory, whatever interrupts, fails or is added."""
 
+import dataclasses
+import json
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -25,6 +27,11 @@ def made(i: int) -> tuple[BenchRun, ...]:
         raise ValueError(f"damper{i}.csv, line 3: no number")
     law = Bilinear(2000.0 + 10.0 * (i % 7), 1200.0)
     return tuple(VirtualDyno(law, force_noise=4.0, sampling_rate=100.0, seed=i).run(TEST))
+
+
+def changed(runs: tuple[BenchRun, ...], **fields: Any) -> tuple[BenchRun, ...]:
+    """Records with other fields."""
+    return tuple(dataclasses.replace(run, **fields) for run in runs)
 
 
 @pytest.fixture(autouse=True)
@@ -84,6 +91,99 @@ def test_only_new_and_changed_dampers_are_fitted(tmp_path, read):
     np.testing.assert_array_equal(line.values[:2], first.values[[0, 2]])
     np.testing.assert_allclose(line.values[2], first.values[4], rtol=1e-6)
     assert np.array_equal(fit_many(Bilinear, records, file=file).values, first.values)
+
+
+def test_what_a_record_states_beside_its_channels_changes_it(tmp_path, read):
+    file, runs = tmp_path / "line.zarr", made(0)
+    moving = {"command_channel": np.linspace(0.0, 1.0, len(runs[0])), "command_unit": "A"}
+    ways: list[dict[str, Any]] = [
+        {},
+        {"settings": {"clicks": 3}},
+        {"stroke_is_integrated": True},
+        moving,
+        {**moving, "command_unit": "V"},
+    ]
+    for way in ways:
+        read.clear()
+        fit_many(START, {"0": runs, "1": changed(made(1), **way)}, file=file)
+        assert read == (["0", "1"] if not way else ["1"])
+
+
+def test_a_damper_that_states_what_the_first_does_not_is_left_out_as_memory_refuses_it(tmp_path):
+    stated = changed(made(0), settings={"compression_rate": "1200 N s/m"})
+    for first, other in ((stated, made(1)), (made(1), stated)):
+        dampers = {"a": first, "b": other, "c": first}
+        with pytest.raises(ValueError, match="must all state their compression_rate"):
+            fit_many(START, dampers)
+        with pytest.warns(UserWarning, match="1 of 3 dampers were left out: b"):
+            line = fit_many(START, dampers, file=tmp_path / f"{len(first[0].settings)}.zarr")
+        lacking = ", but is without one: " + ("20mm_1Hz. Fit" if first is stated else "20mm_1Hz of 'a', with which")
+        assert "`runs` must all state their compression_rate" in line.reasons[1] and lacking in line.reasons[1]
+
+
+def test_another_damper_may_be_the_first_where_the_start_is_a_law(tmp_path, read):
+    file, how = tmp_path / "line.zarr", dict[str, Any](rig="offset")
+    lines = [{str(i): changed(made(i), settings={"compression_rate": f"{1200 + i} N s/m"}) for i in (1, 2)}]
+    lines.append({"0": changed(made(0), settings={"compression_rate": "1190 N s/m"})} | lines[0])
+    for line in lines:
+        fit_many(START, line, file=file, **how)
+    assert read == ["1", "2", "0"]
+    with pytest.raises(ValueError, match="start is Bilinear"):
+        fit_many(Bilinear(1500.0, 1600.0), {"a": made(0)}, file=tmp_path / "line.zarr", **how)
+
+
+def test_the_row_of_other_records_is_not_filled_by_those_of_the_call(tmp_path, monkeypatch):
+    file, old = tmp_path / "line.zarr", {str(i): made(i) for i in range(8, 20)}
+    stopping = _Interrupting(17, many_blocks.fitted_records)
+    monkeypatch.setattr(many_blocks, "fitted_records", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        fit_many(START, old, file=file)
+    stopping.at = -1
+    new = fit_many(START, {**old, "18": made(20)}, file=file)
+    again, expected = fit_many(START, old, file=file), fit_many(START, old)
+    np.testing.assert_allclose(again.values, expected.values, rtol=1e-8)
+    assert abs(new.values[10, 0] - again.values[10, 0]) > 10.0
+    assert not any(again.reasons) and not any(new.reasons)
+
+
+def test_what_a_file_system_says_is_tried_again(tmp_path):
+    away = {"2"}
+
+    def read(i: int) -> tuple[BenchRun, ...]:
+        if str(i) in away:
+            raise PermissionError("the share is away")
+        return made(i)
+
+    dampers = DamperRecords(read, range(4))
+    with pytest.warns(UserWarning, match="1 of 4 dampers were left out: 2"):
+        line = fit_many(START, dampers, file=tmp_path / "line.zarr")
+    assert line.reasons[2] == "the share is away The next call tries it again."
+    away.clear()
+    assert fit_many(START, dampers, file=tmp_path / "line.zarr").converged
+
+
+def test_records_left_out_are_said_and_are_those_of_no_fit(tmp_path):
+    tests = [TEST, SineTest(0.01, 2.0)]
+    law = Bilinear(2000.0, 1200.0)
+    good, bad = (list(VirtualDyno(law, force_noise=4.0, force_limit=f).run(tests)) for f in (None, 120.0))
+    dampers = {"a": [bad[0], good[1]], "b": good}
+    memory = fit_many(START, dampers, bad_records="leave_out")
+    for _ in range(2):  # the second is read from the store
+        line = fit_many(START, dampers, file=tmp_path / "line.zarr", bad_records="leave_out")
+        assert line.remarks == memory.remarks and line.converged
+        assert line.remarks == (f"it was fitted without {bad[0].name!r}: records with an error", "")
+        assert [len(errors) for errors in line.record_rmse] == [1, 2]
+        assert [run.name for run in line.records[0]] == [good[1].name]
+        assert line.fit("a").rmse == pytest.approx(line.rmse[0], rel=0.05)
+
+
+def test_a_store_without_a_fit_is_described(tmp_path):
+    line = fit_many(START, DamperRecords(made, range(3)), file=tmp_path / "line.zarr", cluster="2/2")
+    words = "Bilinear: none of 3 dampers was fitted: its block is not done yet"
+    assert line.summary == words and repr(line).startswith(words)
+    assert json.loads(json.dumps(line.to_dict(), allow_nan=False))["dampers"]["0"]["status"] == "left_out"
+    settled = dataclasses.replace(line, settings=(0.0, 1.0, 2.0))
+    assert settled.unusual == ("0", "1", "2") and len(settled.table().rows) == 3
 
 
 def test_an_interrupted_fit_goes_on_and_parts_share_a_store(tmp_path, read, monkeypatch):
