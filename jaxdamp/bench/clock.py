@@ -1,4 +1,4 @@
-"""The instants of a record: order, gaps, rounding, jitter; and channels that have clocks of their own."""
+"""The instants of a record: order, gaps, rounding, jitter."""
 
 import hashlib
 import itertools
@@ -10,9 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp._checks import ArgumentError, Setting
-from jaxdamp.bench.columns import Choice, is_record
 from jaxdamp.bench.motion import Samples
-from jaxdamp.bench.raw import RawColumn, RawTable
 
 
 FEWEST = 20  # samples of a record
@@ -125,7 +123,10 @@ def _grid(time: Samples) -> tuple[float, float]:
 
 
 def _place(sample: int, lines: Sequence[int] | None) -> str:
-    return f"line {lines[sample]}" if lines is not None and len(lines) else f"sample {sample}"
+    """Where a sample stands: its line or, in a file without lines, its number from 1; in arrays its index."""
+    if lines is None:
+        return f"sample {sample}"
+    return f"line {lines[sample]}" if len(lines) else f"sample {sample + 1}"
 
 
 def _decimals(time: Samples) -> int:
@@ -228,81 +229,3 @@ def _part(time: Samples, samples: slice, notes: tuple[str, ...]) -> Part:
         f"{1 / (grid[1] - grid[0]):.6g} Hz"
     )
     return Part(samples, stored, grid, True, (*notes, note))
-
-
-_ONE_GROUP = "Export the channels of a record on one clock, in one group."
-
-
-def on_one_clock(tables: Sequence[RawTable], choice: Choice) -> list[RawTable]:
-    """The tables of a file; those that hold only the stroke and only the force as one, on the clock with more samples.
-
-    The other channels are interpolated by cubics over the time that both clocks cover. Files with a table that has
-    both, and tables without a column "time" in seconds, stay as they are.
-
-    Raises:
-        ValueError: several tables could belong together, a clock has gaps, or both do not run at the same time.
-    """
-    motion = "velocity" if choice.stroke_from_velocity else "stroke"
-    moved = [table for table in tables if is_record(table, choice, (motion,))]
-    loaded = [table for table in tables if is_record(table, choice, ("force",))]
-    apart = [*moved, *loaded]
-    clocks = list(itertools.chain.from_iterable(map(_clocks, apart)))
-    have_both = any(table in loaded for table in moved)
-    if not moved or not loaded or have_both or len(clocks) < len(apart):
-        return list(tables)
-    names = f"the {motion} in {_records(moved)} and the force in {_records(loaded)}"
-    if len(apart) > 2:
-        raise ArgumentError(
-            f"{apart[0].file}: which groups of different clocks belong together is not clear: {names}. {_ONE_GROUP}"
-        )
-    instants, note = _common_instants(apart, clocks, names)
-    return [_together(apart, clocks, instants, note), *(table for table in tables if table not in apart)]
-
-
-def _together(tables: Sequence[RawTable], clocks: Sequence[Samples], instants: Samples, note: str) -> RawTable:
-    """The channels of tables at the same instants."""
-    columns = [RawColumn("time", instants, "s")]
-    for table, clock in zip(tables, clocks, strict=True):
-        columns += [_at(instants, clock, column) for column in _numbers(table)]
-    return RawTable(tables[0].file, tuple(columns), notes=(note,))
-
-
-def _common_instants(tables: Sequence[RawTable], clocks: Sequence[Samples], names: str) -> tuple[Samples, str]:
-    """The instants of the finest clock that all clocks cover, and a note."""
-    for table, clock in zip(tables, clocks, strict=True):
-        check_order(clock, table.where)
-        if gaps(clock).size:
-            raise ArgumentError(f"{table.where}: the clock has gaps, over which nothing is interpolated. {_ONE_GROUP}")
-    start, stop = max(clock[0] for clock in clocks), min(clock[-1] for clock in clocks)
-    finest = max(clocks, key=lambda clock: len(clock) / (clock[-1] - clock[0]))
-    common = finest[(finest >= start) & (finest <= stop)]
-    if len(common) < FEWEST:
-        raise ArgumentError(f"{tables[0].file}: the clocks of {names} hardly overlap. {_ONE_GROUP}")
-    return common, (
-        f"{names}, on different clocks: brought onto that of {1 / np.median(np.diff(finest)):.4g} Hz by cubics, "
-        f"from {start:.4g} to {stop:.4g} s, which both cover"
-    )
-
-
-def _records(tables: Sequence[RawTable]) -> str:
-    return ", ".join(repr(table.record) for table in tables)
-
-
-def _clocks(table: RawTable) -> list[Samples]:
-    return [np.asarray(column.values) for column in table.columns if (column.name, column.unit) == ("time", "s")]
-
-
-def _numbers(table: RawTable) -> list[RawColumn]:
-    """The channels beside the clock that hold numbers without faults."""
-    columns = [c for c in table.columns if c.name != "time" and not c.is_text and not c.faults]
-    return [c for c in columns if np.all(np.isfinite(np.asarray(c.values)))]
-
-
-def _at(common: np.ndarray, clock: np.ndarray, column: RawColumn) -> RawColumn:
-    """A channel at the instants of another clock."""
-    from scipy.interpolate import CubicSpline  # takes a second to import, and few files need it
-
-    values = np.asarray(column.values)
-    inside = (clock >= common[0]) & (clock <= common[-1])
-    same = np.array_equal(clock[inside], common)
-    return RawColumn(column.name, values[inside] if same else CubicSpline(clock, values)(common), column.unit)

@@ -111,7 +111,16 @@ def is_record(table: RawTable, choice: Choice, roles: Sequence[str] = REQUIRED) 
     """Whether a table has one of these quantities, or its columns have no names to tell."""
     if not table.is_named:
         return len(table.columns) > 1
-    return any(_places(table, choice.columns.get(role)) or _candidates(table, role, choice) for role in roles)
+    return any(
+        _places(table, choice.columns[role]) if role in choice.columns else _candidates(table, role, choice)
+        for role in roles
+    )
+
+
+def lacking(table: RawTable, choice: Choice) -> list[str]:
+    """The quantities that a record needs and a table has not, a stroke or what it is integrated from first."""
+    strokes = ("stroke", "velocity") if choice.stroke_from_velocity else ("stroke",)
+    return [roles[0] for roles in (strokes, ("force",)) if not is_record(table, choice, roles)]
 
 
 def find_one(table: RawTable, role: str, choice: Choice) -> int | None:
@@ -158,7 +167,7 @@ def given_column(table: RawTable, role: str, wanted: str | int, argument: str = 
 def _places(table: RawTable, wanted: str | int | None) -> list[int]:
     """The columns that a number or a header, with or without its unit, names."""
     if not isinstance(wanted, str):
-        return [] if wanted is None else [wanted]
+        return [] if wanted is None or not 0 <= wanted < len(table.columns) else [wanted]
     exact = [index for index, name in enumerate(table.names) if name == wanted]
     bare = wanted.strip().lower()
     return exact or [index for index, name in enumerate(table.names) if split_header(name)[0].lower() == bare]

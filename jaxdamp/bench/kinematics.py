@@ -14,6 +14,7 @@ from jaxdamp._files import FOLDER_SUFFIXES, find_files
 from jaxdamp.bench import sign as signs
 from jaxdamp.bench.columns import Choice, given_column
 from jaxdamp.bench.headers import split_header
+from jaxdamp.bench.one_clock import main_tables
 from jaxdamp.bench.raw import RawTable
 from jaxdamp.bench.readers import READERS, read_tables
 from jaxdamp.bench.table_points import Points, in_si, numbers_of
@@ -100,7 +101,7 @@ def read_kinematics(
     for role in columns or {}:
         _checks.one_of("columns", role, tuple(_WORDS))
     (file,) = find_files([path], FOLDER_SUFFIXES)
-    table = read_tables(file, READERS, delimiter)[0]
+    table = main_tables(read_tables(file, READERS, delimiter))[0]
     at = _columns(table, columns or {})
     choice = Choice(units={**(units or {})})
     travel, unit = in_si(table, at["wheel"], "stroke", choice)

@@ -62,7 +62,8 @@ class RawTable:
     Arguments:
         file: where it was read.
         columns: the channels in the order of the file.
-        record: name of the record inside the file (its sheet or group); empty if the file holds one only.
+        record: name of the record inside the file (its sheet or group); empty if the file holds one only. Tables of
+            one name are one record whose channels have clocks of their own.
         lines: number of the line or row of the file for each sample, for messages; empty for binary files.
         preamble: the lines before the header.
         notes: sentences on what was left out.
@@ -94,8 +95,8 @@ class RawTable:
         return f"{self.file}, record {self.record!r}" if self.record else str(self.file)
 
     def place(self, sample: int) -> str:
-        """Where a sample stands in the file, for messages."""
-        return f"line {self.lines[sample]}" if len(self.lines) else f"sample {sample}"
+        """Where a sample stands in the file, for messages: its line, or its number from 1."""
+        return f"line {self.lines[sample]}" if len(self.lines) else f"sample {sample + 1}"
 
     @property
     def is_named(self) -> bool:

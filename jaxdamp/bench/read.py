@@ -1,9 +1,9 @@
 """Files in, records in SI and one sign convention out: of a bench, or of a vehicle on a road or a rig."""
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TypeVar, Unpack
 
@@ -14,9 +14,11 @@ from jaxdamp._settings import with_defaults
 from jaxdamp._tables import Contents
 from jaxdamp.bench import sign as signs
 from jaxdamp.bench.bench_tables import Interpretation, bench_runs
-from jaxdamp.bench.clock import on_one_clock
-from jaxdamp.bench.columns import Choice, is_record
+from jaxdamp.bench.clock import FEWEST
+from jaxdamp.bench.columns import Choice, is_record, lacking
+from jaxdamp.bench.commands import Command, commanded
 from jaxdamp.bench.manifest import BENCH_KEYS, RIDE_KEYS, find_manifest, merged, read_manifest
+from jaxdamp.bench.one_clock import main_tables, on_one_clock, one_record
 from jaxdamp.bench.raw import Problems, RawTable
 from jaxdamp.bench.readers import BENCH_FILES, FILES, BenchFiles, Files, Reader, read_tables, with_own
 from jaxdamp.bench.ride_record import RideInterpretation, RideRecord, ride_record
@@ -28,7 +30,6 @@ from jaxdamp.bench.several_tests import tests_apart
 
 Paths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
 _Record = TypeVar("_Record")
-Command = float | int | str | Mapping[str, float | int]
 
 
 @with_defaults(BENCH_FILES)
@@ -65,7 +66,8 @@ def read(
             pattern with names in braces, `"*_{current}A"`, that takes the settings from the names of the records.
         manifest: a TOML file with these arguments; True takes `jaxdamp.toml` of the folder that is read, and a note
             says so; False takes none. What is given in the call wins.
-        skip_bad: leave out files that cannot be read, instead of reading none; `BenchSet.left_out` says which and why.
+        skip_bad: leave out files, and records of a file with several, that cannot be read, instead of reading none;
+            `BenchSet.left_out` says which and why.
         drop_bad_rows: leave out rows with a missing value or text, at most ten one after the other and 5 % of all;
             straight lines stand in their place, and a note counts them.
         files: keywords on what is in the files, all optional: `columns`, `gains`, `sampling_rate` and
@@ -110,13 +112,15 @@ def read(
     choice = Choice(*tables, stroke_from_velocity=bool(given["stroke_from_velocity"]))
     how = Interpretation(choice, given["sign"], given["force_sign"], given["sampling_rate"], drop_bad_rows)
     found = find_files(asked, {*FOLDER_SUFFIXES, *(own or {})})
-    runs, errors = _read_files(found, readers, given["delimiter"], lambda tables, name: _bench_runs(tables, name, how))
+    runs, errors = _read_files(
+        found, readers, given["delimiter"], lambda tables, name, errors: _bench_runs(tables, name, how, errors)
+    )
     if errors and not (skip_bad and runs):
-        ways, count = Setting("skip_bad", True), len(found) - len(errors)
-        others = "The other file" if count == 1 else f"The other {count} files"
+        ways, count = Setting("skip_bad", True), len({base for base, _ in runs})
+        others = "The other record" if count == 1 else f"The other {count} records"
         _raise(errors, f"{others} can be read: {ways} leaves out what cannot." if runs else "", ways)
     runs = [(base, replace(run, notes=(*run.notes, *note))) for base, run in runs]
-    return BenchSet(_commanded(_with_settings(runs, given["settings"]), given["command"]), tuple(map(str, errors)))
+    return BenchSet(commanded(_with_settings(runs, given["settings"]), given["command"]), tuple(map(str, errors)))
 
 
 @with_defaults(FILES)
@@ -181,7 +185,7 @@ def read_rides(
         found,
         readers,
         delimiter,
-        lambda tables, name: [ride_record(table, base, how) for table, base in _named(tables, name)],
+        lambda tables, name, errors: _rides(tables, name, how, errors),
     )
     _raise(errors)
     return tuple(replace(record, notes=(*record.notes, *note)) for record in records)
@@ -198,20 +202,31 @@ def _read_files(
     files: Sequence[Path],
     readers: Mapping[str, Reader],
     delimiter: str | None,
-    records: Callable[[Sequence[RawTable], str], list[_Record]],
+    records: Callable[[Sequence[RawTable], str, list[Exception]], list[_Record]],
 ) -> tuple[list[_Record], list[Exception]]:
-    """The records of all files that can be read, and what was wrong with the others."""
-    good, errors = [], []
+    """The records that can be read, of all files, and what was wrong with the others."""
+    good: list[_Record] = []
+    errors: list[Exception] = []
     for file, name in zip(files, _names(files), strict=True):
-        try:
-            good += records(read_tables(file, readers, delimiter), name)
-        except ArithmeticError as error:
-            said = f"its numbers cannot be computed with ({type(error).__name__}: {error})"
-            errors.append(ValueError(f"{file}: {said}. Export it again."))
-        except (ValueError, OSError, ImportError) as error:
-            unnamed = type(error) is ValueError and str(file) not in str(error)
-            errors.append(ValueError(f"{file}: {error}") if unnamed else error)
+        wrong: list[Exception] = []
+        with _kept(wrong):
+            try:
+                good += records(read_tables(file, readers, delimiter), name, wrong)
+            except ArithmeticError as error:
+                said = f"its numbers cannot be computed with ({type(error).__name__}: {error})"
+                raise ValueError(f"{file}: {said}. Export it again.") from error
+        unnamed = [type(error) is ValueError and str(file) not in str(error) for error in wrong]
+        errors += [ValueError(f"{file}: {e}") if bare else e for e, bare in zip(wrong, unnamed, strict=True)]
     return good, errors
+
+
+@contextmanager
+def _kept(errors: list[Exception]) -> Iterator[None]:
+    """Keep the error of a record, or of a file, and go on behind it."""
+    try:
+        yield
+    except (ValueError, OSError, ImportError) as error:
+        errors.append(error)
 
 
 def _raise(errors: Sequence[Exception], remedy: str = "", *settings: Setting) -> None:
@@ -243,22 +258,51 @@ def _named(tables: Sequence[RawTable], name: str) -> list[tuple[RawTable, str]]:
     return [(table, f"{name}/{table.record}" if len(tables) > 1 else name) for table in tables]
 
 
-def _bench_runs(tables: Sequence[RawTable], name: str, how: Interpretation) -> list[tuple[str, BenchRun]]:
-    """The records of a file, each with its name before it was cut at gaps.
+def _bench_runs(
+    tables: Sequence[RawTable], name: str, how: Interpretation, errors: list[Exception]
+) -> list[tuple[str, BenchRun]]:
+    """The records of a file, each with its name before it was cut at gaps; the errors of the others are kept.
 
-    Tables without stroke and force are left out of a file that has others, with a note.
+    Tables without stroke and force, or too short, are left out of a file that has records, with a note.
     """
-    tables = [part for table in tables for part in tests_apart(table, how.choice)]
-    tables = on_one_clock(tables, how.choice) if len(tables) > 1 else tables
-    good = [table for table in tables if is_record(table, how.choice)] or tables
-    left_out = ", ".join(repr(table.record) for table in tables if table not in good)
-    note = (f"{left_out} of the file left out: neither stroke nor force",) if left_out else ()
-    runs, problems = [], Problems()
+    whole, runs = on_one_clock(_tests(tables, how.choice, errors), how.choice), []
+    short = {table: _why_no_record(table, how.choice) for table in whole}
+    good = [table for table, why in short.items() if not why]
+    good = good or [table for table in whole if is_record(table, how.choice)] or whole
+    left_out = [f"{t.record!r} of the file left out: {why}" for t, why in short.items() if t not in good]
     for table, base in _named(good, name):
-        with problems.collected():
-            runs += [(base, replace(run, notes=(*run.notes, *note))) for run in bench_runs(table, base, how)]
-    problems.raise_any()
+        with _kept(errors):
+            runs += [(base, replace(run, notes=(*run.notes, *left_out))) for run in bench_runs(table, base, how)]
     return runs
+
+
+def _tests(tables: Sequence[RawTable], choice: Choice, errors: list[Exception]) -> list[RawTable]:
+    """The tests of the tables, those of one name as one; the errors of those that do not fit together are kept."""
+    parts: dict[str, list[RawTable]] = {}
+    for part in (part for table in tables for part in tests_apart(table, choice)):
+        parts.setdefault(part.record, []).append(part)
+    whole = []
+    for together in parts.values():
+        with _kept(errors):
+            whole += one_record(together, choice)
+    return whole
+
+
+def _why_no_record(table: RawTable, choice: Choice) -> str:
+    """Why a table is none of the records of a file, by what it has not; empty if it may be one."""
+    without = lacking(table, choice)
+    if without:
+        return "neither stroke nor force" if len(without) > 1 else f"no {without[0]}"
+    return "" if len(table) >= FEWEST else f"{len(table)} samples, and a record needs {FEWEST}"
+
+
+def _rides(tables: Sequence[RawTable], name: str, how: RideInterpretation, errors: list[Exception]) -> list[RideRecord]:
+    """The records of a file with a vehicle; the errors of those that cannot be read are kept."""
+    records = []
+    for table, base in _named(main_tables(tables), name):
+        with _kept(errors):
+            records.append(ride_record(table, base, how))
+    return records
 
 
 def _with_settings(
@@ -277,44 +321,3 @@ def _with_settings(
         )
         for base, run in runs
     ]
-
-
-def _commanded(runs: list[tuple[str, BenchRun]], command: Command | None) -> list[BenchRun]:
-    """The records with the commands given."""
-    if command is None:
-        return [run for _, run in runs]
-    if isinstance(command, str):
-        return [_held(run, _setting(run, command)) for _, run in runs]
-    if not isinstance(command, Mapping):
-        return [_held(run, command) for _, run in runs]
-    patterns = {base: [key for key in command if fnmatchcase(base, key)] for base, _ in runs}
-    _check_patterns(command, patterns)
-    return [_held(run, command[patterns[base][0]]) for base, run in runs]
-
-
-def _held(run: BenchRun, command: float | int) -> BenchRun:
-    """The record with a command that is held, whatever its column shows."""
-    note = (f"column of the command left out, since it is stated as {command:g}",) * (run.command_channel is not None)
-    return replace(run.held_at(command), notes=(*run.notes, *note))
-
-
-def _check_patterns(command: Mapping[str, float | int], patterns: Mapping[str, Sequence[str]]) -> None:
-    """Refuse commands for no record, and records with none or several commands."""
-    fitting = {key for keys in patterns.values() for key in keys}
-    unused = ", ".join(repr(key) for key in command if key not in fitting)
-    if unused:
-        _checks.refuse("command", "name records that are read", unused, f"There are {', '.join(patterns)}.")
-    doubtful = [f"{name} ({len(keys)})" for name, keys in patterns.items() if len(keys) != 1]
-    if doubtful:
-        must = "fit each record with exactly one pattern"
-        _checks.refuse("command", must, f"fitting otherwise for {', '.join(doubtful)}")
-
-
-def _setting(run: BenchRun, name: str) -> float:
-    """The setting of a record that is its command."""
-    value = run.settings.get(name)
-    if not isinstance(value, int | float):
-        settings = ", ".join(f"{key}={value!r}" for key, value in run.settings.items()) or "none"
-        must = f"name a setting that is a number, also of {run.name!r}"
-        _checks.refuse("command", must, repr(name), f"Its settings: {settings}.")
-    return float(value)

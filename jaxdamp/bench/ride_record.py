@@ -14,7 +14,7 @@ from jaxtyping import Float
 from jaxdamp import _checks
 from jaxdamp._tables import Contents, plain
 from jaxdamp.bench import clock, stamps
-from jaxdamp.bench.columns import given_column
+from jaxdamp.bench.columns import Choice, find_one, given_column
 from jaxdamp.bench.headers import split_header
 from jaxdamp.bench.motion import Samples
 from jaxdamp.bench.raw import RawTable
@@ -198,10 +198,15 @@ def ride_record(table: RawTable, name: str, how: RideInterpretation) -> RideReco
     """
     headers = [split_header(column.name)[0] for column in table.columns]
     roads = [given_column(table, ROAD, which, "road") for which in _road_columns(table, headers, how.road)]
-    time_column = (how.columns or {}).get("time", "time" if "time" in headers else None)
-    chosen = _channels(table, headers, how.columns, {*roads}, time_column)
+    at = _time_column(table, headers, how)
+    chosen = _channels(table, headers, how.columns, {*roads, *([] if at is None else [at])})
+    if not chosen:
+        remedy = "A record needs a measured channel beside the road, in the same table, sheet or group."
+        raise ValueError(
+            f"{table.where}: no channel beside road and time; its columns are {', '.join(table.names)}. {remedy}"
+        )
     how.check_names(chosen)
-    time = _time(table, time_column, how)
+    time = _time(table, at, how)
     channels = {channel: _values(table, index, channel, how) for channel, index in chosen.items()}
     wheels = [_values(table, index, ROAD, how) for index in roads]
     kinds = {unit for _, unit in wheels}
@@ -230,12 +235,11 @@ def _channels(
     table: RawTable,
     headers: Sequence[str],
     columns: Mapping[str, str | int] | None,
-    roads: set[int],
-    time_column: str | int | None,
+    others: set[int],
 ) -> dict[str, int]:
-    """Number of the column of each channel: those asked for, or all that have a name."""
+    """Number of the column of each channel: those asked for, or all that have a name but for road and time."""
     if columns is None:
-        return {h: i for i, h in enumerate(headers) if h and i not in roads and h != time_column}
+        return {header: index for index, header in enumerate(headers) if header and index not in others}
     return {channel: given_column(table, channel, which) for channel, which in columns.items() if channel != "time"}
 
 
@@ -278,16 +282,22 @@ def _to_si(written: str, units: Sequence[str]) -> tuple[float | None, str]:
     return next(((factor, unit) for unit in units if (factor := ratio(plain, unit)) is not None), (None, ""))
 
 
-def _time(table: RawTable, time_column: str | int | None, how: RideInterpretation) -> Samples:
+def _time_column(table: RawTable, headers: Sequence[str], how: RideInterpretation) -> int | None:
+    """The number of the column of the time: that given, that of the name "time", or one that `read` takes for it."""
+    wanted = (how.columns or {}).get("time", "time" if "time" in headers else None)
+    return find_one(table, "time", Choice()) if wanted is None else given_column(table, "time", wanted)
+
+
+def _time(table: RawTable, index: int | None, how: RideInterpretation) -> Samples:
     """The instants [s]."""
     rate = how.sampling_rate
-    if time_column is None:
+    if index is None:
         if rate is None:
             raise ValueError(f"{table.where} has no column `time`: pass `sampling_rate` [Hz], or name it in `columns`.")
         return clock.uniform_time(rate, len(table))
     if rate is not None:
-        raise ValueError(f"{table.where} has a column of time: leave `sampling_rate` out.")
-    index = given_column(table, "time", time_column)
+        remedy = "leave `sampling_rate` out."
+        raise ValueError(f"{table.where} has a column of time, {table.names[index]!r}: {remedy}")
     raw = table.columns[index]
     where = f"{table.where}, column {table.names[index]!r}"
     if raw.is_text:

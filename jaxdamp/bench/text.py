@@ -1,6 +1,5 @@
 """Text files with columns of numbers: delimiter, decimal sign, preamble, header, footer."""
 
-import itertools
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -12,6 +11,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
 from jaxdamp._files import check_size
+from jaxdamp.bench.blocks import blocks_of, named_apart, title
 from jaxdamp.bench.layout import (
     DELIMITERS,
     PLAIN_COMMA,
@@ -20,7 +20,6 @@ from jaxdamp.bench.layout import (
     columns_of,
     header_of,
     layout_of,
-    number,
     split,
 )
 from jaxdamp.bench.raw import RawColumn, RawTable
@@ -66,24 +65,15 @@ def read_text(file: Path, delimiter: str | None = None) -> list[RawTable]:
         raise ValueError(f"{file}: no row has a number in each of its {layout.count} columns: mend or shorten it.")
     first = rows[header.first][0]
     above = rows[header.top][0]
-    starts = _starts(lines, above, first - above, layout)
-    tables, behind = [], 0  # number of the last line of the table before
-    for start, following in zip(starts, [*starts[1:], len(lines) + 1], strict=True):
-        end = len(lines) if len(starts) == 1 else _end(lines, start + first - above, following - 1, layout)
-        preamble = tuple(line for line in lines[behind : start - 1] if line.strip())
-        table = _table(file, lines[:end], start + first - above, layout, header)
-        tables.append(replace(table, preamble=preamble, record=_title(preamble, start if behind else None, layout)))
-        behind = end
-    return _with_names_apart(tables)
-
-
-def _starts(lines: list[str], above: int, depth: int, layout: Layout) -> list[int]:
-    """The numbers of the lines with the header, where it stands over several blocks."""
-    if not depth or lines.count(lines[above - 1]) == 1:
-        return [above]
-    head = lines[above - 1].strip()
-    starts = [at for at, line in enumerate(lines, 1) if line.strip() == head]
-    return starts if _begin_again(lines, starts, depth, layout) else [above]
+    head = lines[above - 1]
+    again = lines.count(head) > 1
+    like = [at for at, line in enumerate(lines, 1) if line.strip() == head.strip()] if again else [above]
+    tables = []
+    for block in blocks_of(lambda at: split(lines[at - 1], layout.delimiter), len(lines), above, first, like, layout):
+        preamble = tuple(line for line in lines[block.behind : block.header - 1] if line.strip())
+        table = _table(file, lines[: block.end], block.first, layout, header)
+        tables.append(replace(table, preamble=preamble, record=title(preamble, block, block.header, layout)))
+    return named_apart(tables, "")
 
 
 def _table(file: Path, lines: list[str], first: int, layout: Layout, header: Header) -> RawTable:
@@ -94,45 +84,6 @@ def _table(file: Path, lines: list[str], first: int, layout: Layout, header: Hea
         columns = columns_of(file, numbers, _in_chunks(body, layout.delimiter, layout.count), layout)
     columns = [replace(c, name=n, unit=u) for c, n, u in zip(columns, header.names, header.units, strict=True)]
     return RawTable(file, tuple(columns), lines=numbers, notes=notes)
-
-
-def _end(lines: list[str], first: int, last: int, layout: Layout) -> int:
-    """The number of the last row of numbers among these lines."""
-    while last >= first and not layout.is_row(split(lines[last - 1], layout.delimiter)):
-        last -= 1
-    return last
-
-
-def _begin_again(lines: list[str], starts: list[int], depth: int, layout: Layout) -> bool:
-    """Whether the numbers below each header begin again: a header inside one record is a fault of the file."""
-    ends = [_end(lines, start + depth, following - 1, layout) for start, following in itertools.pairwise(starts)]
-    ends.append(_end(lines, starts[-1] + depth, len(lines), layout))
-    if any(end - start - depth < 1 for start, end in zip(starts, ends, strict=True)):
-        return False
-    first = [_first_number(lines[start + depth - 1], layout) for start in starts]
-    last = [_first_number(lines[end - 1], layout) for end in ends]
-    return all(a is not None and b is not None and a > b for a, b in zip(last[:-1], first[1:], strict=True))
-
-
-def _first_number(line: str, layout: Layout) -> float | None:
-    cells = split(line, layout.delimiter)
-    return number(cells[layout.full[0]], layout.delimiter) if layout.full[0] < len(cells) else None
-
-
-def _title(preamble: tuple[str, ...], start: int | None, layout: Layout) -> str:
-    """What stands above the header of a block; the number of its line where nothing does."""
-    words = [cell for cell in split(preamble[-1], layout.delimiter) if cell] if preamble else []
-    return " ".join(words)[:60] or (f"line {start}" if start else "first")
-
-
-def _with_names_apart(tables: list[RawTable]) -> list[RawTable]:
-    """Tables of a file with names of their own; a single one needs none."""
-    names = [table.record for table in tables]
-    if len(tables) == 1:
-        return [replace(tables[0], record="")]
-    apart = [f"{name} {number}" if names.count(name) > 1 else name for number, name in enumerate(names, 1)]
-    said = f"one of {len(tables)} blocks of the file, each under a header of its own"
-    return [replace(t, record=name, notes=(*t.notes, said)) for t, name in zip(tables, apart, strict=True)]
 
 
 def _check_width(file: Path, top: list[tuple[int, str]]) -> None:

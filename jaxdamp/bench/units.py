@@ -158,7 +158,7 @@ def named_conversion(role: str, written: str, where: str) -> Conversion:
     known_unit = conversion(role, written)
     if known_unit is not None:
         return known_unit
-    near = get_close_matches(written, [*USUAL[role], *_WRITTEN[role]], 1, cutoff=0.4)
+    near = get_close_matches(written, [*USUAL[role], *_WRITTEN[role]], 1, cutoff=0.6) if written.strip("-–— ") else []
     hint = f"Did you mean {near[0]!r}? " if near else ""
     if ratio(written, "V") is not None or written.strip().lower() in SIGNALS:
         gain = Setting("gains", {role: f"{GAINS[role]}/{written}"})

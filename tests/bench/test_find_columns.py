@@ -186,3 +186,11 @@ def test_a_row_of_unusual_units_is_one(tmp_path):
     run = bench.read(written(tmp_path, head), sign="rebound-positive", stroke_from_velocity=True)[0]
     assert np.max(np.abs(run.velocity)) == pytest.approx(1 / 3.6, rel=1e-3)
     assert np.max(np.abs(run.force)) == pytest.approx(4448.22, rel=1e-3)
+
+
+@pytest.mark.parametrize(("written", "hint"), [("-", ""), ("–", ""), ("bananas", ""), ("lbff", "Did you mean 'lbf'? ")])
+def test_a_unit_is_proposed_only_where_it_is_near(written, hint):
+    with pytest.raises(ValueError) as refused:
+        find_columns(_table("t", "x", "F", units=("s", "mm", written)))
+    assert f"{written!r} is no known unit of force. {hint}Usual ones are N, kN" in str(refused.value)
+    assert f'pass units={{"force": "{"lbf" if hint else "N"}"}}' in str(refused.value)

@@ -127,7 +127,7 @@ def test_tdms(tmp_path):
     same(runs[0])
     np.testing.assert_allclose(runs[1].time, T, atol=1e-12)
     np.testing.assert_array_equal(runs[1].force, F)
-    assert any("left out, because they do not have 300 samples: events (3)" in note for note in runs[0].notes)
+    assert any("do not have the 300 samples or the clock of the others: events (3)" in note for note in runs[0].notes)
 
 
 def test_mf4(tmp_path):
@@ -180,6 +180,18 @@ def test_parquet(tmp_path):
     schema = pa.schema([("time", pa.timestamp("us")), ("x_mm", pa.float64()), field, ("state", pa.string())])
     pq.write_table(pa.table([when, X, F, ["ok"] * 300], schema=schema), tmp_path / "a.parquet")
     same(read(tmp_path / "a.parquet")[0], np.arange(300) * 5 / 1000)
+
+
+def test_parquet_decimals_are_numbers_and_samples_count_from_one(tmp_path):
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    force = pa.array(F).cast(pa.decimal128(20, 9))
+    pq.write_table(pa.table({"t_s": T, "x_mm": X, "F_N": force}), tmp_path / "a.parquet")
+    np.testing.assert_allclose(read(tmp_path / "a.parquet")[0].force, F)
+    pq.write_table(pa.table({"t_s": T, "x_mm": X, "F_N": np.where(T == T[0], np.nan, F)}), tmp_path / "a.parquet")
+    with pytest.raises(ValueError, match=r"a\.parquet, sample 1: the force"):
+        read(tmp_path / "a.parquet")
 
 
 @pytest.mark.parametrize("suffix", [".xlsx", ".mat", ".tdms", ".mf4", ".parquet"])

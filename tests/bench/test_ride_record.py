@@ -49,6 +49,15 @@ def test_columns_of_a_file_get_names_units_and_signs(tmp_path):
         read_rides(tmp_path, manifest=False)
 
 
+@pytest.mark.parametrize("header", ["Time [s]", "Zeit [s]", "t_s [s]"])
+def test_the_time_of_a_ride_is_found_as_that_of_a_bench_record(tmp_path, header):
+    rows = [f"{t},{w},{w}" for t, w in zip(TIME, WAVE, strict=True)]
+    (tmp_path / "ride.csv").write_text("\n".join([f"{header},road [mm],stroke [mm]", *rows]))
+    one = read_rides(tmp_path / "ride.csv")[0]
+    np.testing.assert_array_equal(one.time, TIME)
+    assert [*one.channels] == ["stroke"]
+
+
 def test_forces_on_the_wheels_are_known_by_their_unit(tmp_path):
     one = record(driven_by="forces", road=300.0 * WAVE)
     again = read_rides(one.to_csv(tmp_path / "one.csv"))[0]
@@ -88,7 +97,7 @@ def test_wrong_records_are_refused(changed, message):
         ("time [s],road [m],stroke [bar]", {}, "'bar' is no unit of 'stroke'"),
         ("time [s],road [s],stroke [m]", {}, "'s' is no unit of 'road'"),
         ("time [s],pad [m],stroke [m]", {}, "no column `road`"),
-        ("clock [s],road [m],stroke [m]", {}, "pass `sampling_rate`"),
+        ("since [s],road [m],stroke [m]", {}, "pass `sampling_rate`"),
         ("time [s],road [m],stroke [m]", {"columns": {"stroke": "strok"}}, "no column 'strok'.*Did you mean 'stroke'"),
         ("time [s],road [m],stroke [m]", {"sampling_rate": 100.0}, "leave `sampling_rate` out"),
         ("time [s],road [m],stroke [m]", {"units": {"strike": "m"}}, "Did you mean 'stroke'"),
