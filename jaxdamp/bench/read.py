@@ -116,8 +116,9 @@ def read(
         found, readers, given["delimiter"], lambda tables, name, errors: _bench_runs(tables, name, how, errors)
     )
     if errors and not (skip_bad and runs):
-        ways, count = Setting("skip_bad", True), len({base for base, _ in runs})
-        others = "The other record" if count == 1 else f"The other {count} records"
+        ways, names = Setting("skip_bad", True), {base for base, _ in runs}
+        what = "file" if names <= {*_names(found)} else "record"
+        others = f"The other {what}" if len(names) == 1 else f"The other {len(names)} {what}s"
         _raise(errors, f"{others} can be read: {ways} leaves out what cannot." if runs else "", ways)
     runs = [(base, replace(run, notes=(*run.notes, *note))) for base, run in runs]
     return BenchSet(commanded(_with_settings(runs, given["settings"]), given["command"]), tuple(map(str, errors)))
@@ -146,7 +147,7 @@ def read_rides(
         road: headers or numbers of the columns with the height under each wheel, or the force on it, in the order of
             `vehicle.wheel_names`; left out, the column "road", or "road 1", "road 2" and so on.
         reversed_channels: channels (or "road") that the file counts positive downwards or in compression.
-        sampling_rate: samples per second [Hz], for files without the column "time".
+        sampling_rate: samples per second [Hz], for files without a column of the time, which is found as by `read`.
         manifest: a TOML file with these arguments, as in `read`: True takes `jaxdamp.toml` of the folder that is read.
         files: `units`, `delimiter` and `readers`, all optional (see `Files`).
 

@@ -33,7 +33,7 @@ from jaxdamp.simulation import Ride
 
 APART = 0.01  # relative difference of a parameter between them that is named
 Numbers: TypeAlias = Callable[[PyTree], Mapping[str, PyTree]] | Ride  # that a model has
-Goal: TypeAlias = float | int | tuple[float | int, float | int]
+Goal: TypeAlias = float | int | Sequence[float | int]
 
 
 class Met(NamedTuple):
