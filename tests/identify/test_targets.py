@@ -90,6 +90,7 @@ def test_fewer_targets_than_numbers_move_what_they_must_and_say_so():
     [
         ({"a": 1.0}, {}, {}, "`targets` must be numbers by name"),
         ({"a": 1.0}, {"b": 1.0}, {}, "`targets` must be one of 'a'"),
+        ({"a": 1.0}, {"a": (1.0, 0.1, 0.2)}, {}, "be a number, or it and its tolerance"),
         ({"a": 1.0}, {"a": 0.0}, {}, r"`tolerance of targets\['a'\]` must be positive"),
         ({"a": 1.0}, {"a": 2.0}, {"freeze": ["a"]}, "leave a number to change"),
         ({"a": 1.0}, {"a": 2.0}, {"bounds": {"a": (2.0, 3.0)}}, "`a` must start between 2 and 3"),
