@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
 from jaxdamp.bench.raw import RawColumn, RawTable
-from jaxdamp.bench.raw_tables import alone, library, tables_by_clock
+from jaxdamp.bench.raw_tables import Untyped, alone, library, tables_by_clock
 
 
 _MOST_COLUMNS = 64  # of a matrix that is taken for channels side by side
@@ -15,7 +15,7 @@ _UNITS, _LABELS = ("unit", "units"), ("name", "label", "title")  # keys in lower
 _DATA, _FACTORS, _OFFSETS = ("data", "values", "value", "samples"), ("scale", "factor", "gain", "slope"), ("offset",)
 _NAMES = ("names", "labels", "channels", "channelnames", "channel_names", "columns", "headers", "header")
 _SIGNALS = "signals"  # of the structures that Simulink writes, in which a channel may be a matrix
-Structure: TypeAlias = dict[str, Any]  # arrays, numbers, texts, lists and structures
+Structure: TypeAlias = dict[str, Untyped]  # arrays, numbers, texts, lists and structures
 
 
 def read_mat(file: Path) -> list[RawTable]:
@@ -24,7 +24,7 @@ def read_mat(file: Path) -> list[RawTable]:
     return alone(list(_structures(file, "", {k: v for k, v in content.items() if not k.startswith("__")}, {})))
 
 
-def _structures(file: Path, name: str, fields: Structure, units: Mapping[str, Any]) -> Iterator[RawTable]:
+def _structures(file: Path, name: str, fields: Structure, units: Mapping[str, Untyped]) -> Iterator[RawTable]:
     """The record of a structure, and those of the structures inside it; units of its channels may stand around it."""
     stated = _of_kind(fields, _UNITS, dict)
     units = {**units, **(stated or {})}
@@ -42,7 +42,7 @@ def _structures(file: Path, name: str, fields: Structure, units: Mapping[str, An
         yield from _structures(file, f"{name}.{place}".lstrip("."), element, units)
 
 
-def _of_kind(fields: Structure, keys: Sequence[str], kind: type) -> Any:
+def _of_kind(fields: Structure, keys: Sequence[str], kind: type) -> Untyped:
     """The value of the first of these fields, in any case, that is of a kind; None without one."""
     return next((value for key, value in fields.items() if key.lower() in keys and isinstance(value, kind)), None)
 
@@ -52,14 +52,14 @@ def _text(value: object) -> str:
     return value.strip() if isinstance(value, str) else ""
 
 
-def _texts(value: Any) -> list[str]:
+def _texts(value: Untyped) -> list[str]:
     """The texts of a cell array, or of a matrix of characters; none for something else."""
     cells = list(value) if isinstance(value, np.ndarray) and value.dtype.kind == "U" and value.ndim == 1 else value
     found = isinstance(cells, list) and any(isinstance(cell, str) for cell in cells)
     return [_text(cell) for cell in cells] if found else []
 
 
-def _elements(key: str, value: Any) -> list[tuple[str, Structure]]:
+def _elements(key: str, value: Untyped) -> list[tuple[str, Structure]]:
     """The structures in a field, with their names: itself, a cell array of them, or an array, read as one of lists."""
     elements = value if isinstance(value, list) and all(isinstance(item, dict) for item in value) else []
     if isinstance(value, dict):
@@ -125,7 +125,7 @@ def _scalars(fields: Structure, keys: Sequence[str]) -> dict[str, float]:
     return {key: float(value) for key, value in found.items() if isinstance(value, int | float)}
 
 
-def _named(fields: Structure, value: Any) -> list[RawColumn]:
+def _named(fields: Structure, value: Untyped) -> list[RawColumn]:
     """The columns of a matrix that has a list of names beside it, and perhaps one of units; none without names."""
     names = next((texts for key, item in fields.items() if key.lower() in _NAMES and (texts := _texts(item))), [])
     columns = _vectors("", value, "") if names and isinstance(value, np.ndarray) and value.ndim == 2 else []

@@ -1,12 +1,11 @@
 """Reader of MDF files: channel groups with the same clock are a record together."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from jaxdamp.bench.raw import RawColumn, RawTable
-from jaxdamp.bench.raw_tables import alone, apart, library
+from jaxdamp.bench.raw_tables import Untyped, alone, apart, library
 
 
 _TIME = 1  # what a master channel measures, of time, angle, distance and index; files before MDF4 know time only
@@ -34,12 +33,12 @@ def read_mdf(file: Path) -> list[RawTable]:
     return alone([RawTable(file, tuple(c), name) for c, name in zip(whole, names, strict=True) if c])
 
 
-def _name(group: Any) -> str:
+def _name(group: Untyped) -> str:
     """The name of a channel group, which has a comment at most before MDF4."""
     return getattr(group, "acq_name", "") or group.comment
 
 
-def _column(content: Any, group: int, index: int) -> RawColumn | None:
+def _column(content: Untyped, group: int, index: int) -> RawColumn | None:
     """A channel of numbers, NaN where the file says that a sample is invalid; None for texts and structures."""
     channel = content.get(group=group, index=index, ignore_invalidation_bits=True)
     if channel.samples.dtype.kind not in "biuf" or channel.samples.ndim != 1:
@@ -49,7 +48,7 @@ def _column(content: Any, group: int, index: int) -> RawColumn | None:
     return RawColumn(channel.name, values, channel.unit)
 
 
-def _master(content: Any, group: int) -> RawColumn | None:
+def _master(content: Untyped, group: int) -> RawColumn | None:
     """The channel over which a group is recorded: "time" in seconds, or what else it is; None where it has none."""
     about = content.groups[group].channel_group
     owner = group if group in content.masters_db else getattr(about, "cg_master_index", None)

@@ -5,12 +5,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from jaxdamp.bench.headers import role_of
 from jaxdamp.bench.raw import RawColumn, RawTable
+
+
+Untyped: TypeAlias = Any  # an object of a library that states no types
 
 
 def library(module: str, file: Path) -> ModuleType:

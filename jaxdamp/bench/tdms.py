@@ -2,12 +2,11 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from jaxdamp.bench.raw import RawColumn, RawTable
-from jaxdamp.bench.raw_tables import Clock, alone, library, tables_by_clock
+from jaxdamp.bench.raw_tables import Clock, Untyped, alone, library, tables_by_clock
 
 
 _UNSET = np.datetime64("1904-01-01T00:00:00", "ns")  # the zero of LabVIEW, where no start was written
@@ -24,7 +23,7 @@ def read_tdms(file: Path) -> list[RawTable]:
     return alone([table for name, channels in groups for table in _tables(file, name, channels, origin)])
 
 
-def _tables(file: Path, name: str, channels: Sequence[Any], origin: np.datetime64 | None) -> list[RawTable]:
+def _tables(file: Path, name: str, channels: Sequence[Untyped], origin: np.datetime64 | None) -> list[RawTable]:
     """The channels of a group, one table for each clock."""
     columns, clocks, unplaced = [], [], []
     starts = [_seconds(start, origin) for channel in channels if (start := _start(channel)) is not None]
@@ -44,7 +43,7 @@ def _tables(file: Path, name: str, channels: Sequence[Any], origin: np.datetime6
     return tables_by_clock(file, name, columns, clocks, [said] * bool(unplaced))
 
 
-def _start(channel: Any) -> np.datetime64 | None:
+def _start(channel: Untyped) -> np.datetime64 | None:
     """The date of the first sample of a channel: of a waveform, or of dates; None where none is written."""
     stated = channel.properties.get("wf_start_time")
     if stated is None and len(channel) and channel.dtype.kind == "M":
@@ -53,6 +52,6 @@ def _start(channel: Any) -> np.datetime64 | None:
     return None if np.isnat(date) or date == _UNSET else date
 
 
-def _seconds(dates: Any, origin: np.datetime64 | None) -> Any:
+def _seconds(dates: Untyped, origin: np.datetime64 | None) -> Untyped:
     """Seconds from the first date of the file."""
     return (dates - origin) / np.timedelta64(1, "s")

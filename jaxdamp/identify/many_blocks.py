@@ -7,7 +7,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, final, overload
+from typing import Any, TypeAlias, final, overload
 
 import jax
 import numpy as np
@@ -40,6 +40,7 @@ ABSENT = "Its records were not among those of the call that came to its block."
 AGAIN = "The next call tries it again."  # at the end of a reason that may pass
 FLOAT = np.dtype(np.float64)
 OF_EACH = ("values", "standard_errors", "bias")  # of each parameter of each damper
+Row: TypeAlias = dict[str, Any]  # what is stored of a damper
 NUMBERS = ("fit_percent", "rmse", "drift", "share_left_out")  # of each damper, beside those of its parameters
 
 
@@ -108,7 +109,7 @@ class DamperFits(AbstractWork):
             stated(model, (self._first, *runs))
         return runs, [run.name for run in records if run not in runs]
 
-    def _fitted(self, records: AllRecords) -> dict[str, dict[str, Any]]:
+    def _fitted(self, records: AllRecords) -> dict[str, Row]:
         """What is stored of each damper; if the fit of all together raises, those of its halves, to leave one out."""
         from jaxdamp.identify.many import fitted_together  # of `fit_many`, which hands its blocks to this file
 
@@ -127,9 +128,9 @@ class DamperFits(AbstractWork):
         return {name: _row(many, place) for place, name in enumerate(names)}
 
 
-def _row(many: ManyFits, place: int) -> dict[str, Any]:
+def _row(many: ManyFits, place: int) -> Row:
     """What is stored of a damper, errors of its records as a list."""
-    row: dict[str, Any] = {
+    row: Row = {
         name: getattr(many, name)[place] for name in ("values", "standard_errors", "fit_percent", "rmse", "steps")
     }
     row |= {name: array[place] for name in ("drift", "share_left_out") if (array := getattr(many, name)).size}
