@@ -48,7 +48,7 @@ def _start(channel: Untyped) -> np.datetime64 | None:
     stated = channel.properties.get("wf_start_time")
     if stated is None and len(channel) and channel.dtype.kind == "M":
         stated = channel[0]
-    date = np.datetime64("NaT") if stated is None else np.datetime64(stated, "ns")
+    date = np.datetime64("NaT", "ns") if stated is None else np.datetime64(stated, "ns")
     return None if np.isnat(date) or date == _UNSET else date
 
 
