@@ -1,4 +1,4 @@
-"""The instants of a record: order, gaps, rounding, jitter."""
+"""The channels of a record as arrays, and its instants: order, gaps, rounding, jitter."""
 
 import hashlib
 import itertools
@@ -7,13 +7,15 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import ArrayLike, Float
 
+from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
 from jaxdamp.bench.motion import Samples
 
 
 FEWEST = 20  # samples of a record
+_MEASURED = "A record is measured: keep it out of the arguments of `jax.jit`, and trace the law (`jaxdamp.respond`)."
 _GAP = 1.5  # sampling steps that are taken for a gap
 _OFTEN = 0.02  # share of such steps beyond which a clock jitters
 _WIDE_GAP = 3.0  # sampling steps that are a gap even then
@@ -23,6 +25,15 @@ _JITTER = 0.02  # sampling steps by which an instant may be off
 def uniform_time(rate: float | int, count: int) -> Samples:
     """Instants [s] of samples taken at a rate [Hz], from zero."""
     return np.arange(count) / rate
+
+
+def channel_of(channel: str, values: ArrayLike, count: int) -> Float[np.ndarray, " time"]:
+    """A copy of a channel, of the length of the time."""
+    _checks.untraced(channel, values, _MEASURED)
+    column = np.array(values, dtype=np.float64)
+    if column.ndim != 1 or len(column) != count:
+        _checks.refuse(channel, f"be a column of as many samples as the time, {count}", f"of shape {column.shape}")
+    return column
 
 
 def digest(*channels: np.ndarray) -> bytes:

@@ -105,8 +105,9 @@ class RideRecord:
 
     @cached_property
     def fingerprint(self) -> bytes:
-        """A digest of the samples, the same for a record that is read again, copied or renamed."""
-        return clock.digest(self.time, self.road, *(self.channels[name] for name in sorted(self.channels)))
+        """A digest of the channels, the same for a record that is read again, copied or renamed."""
+        names = sorted(self.channels)
+        return clock.digest(self.time, self.road, np.array(names), *(self.channels[name] for name in names))
 
     def __getitem__(self, channel: str) -> Float[np.ndarray, " time"]:
         """A measured channel."""

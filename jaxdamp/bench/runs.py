@@ -27,17 +27,7 @@ NOTE_MARK = "# note: "
 COMMAND_MARK = "# command: "
 SETTINGS_MARK = "# settings: "
 INTEGRATED_MARK = "# stroke: integrated from the velocity"
-MEASURED = "A record is measured: keep it out of the arguments of `jax.jit`, and trace the law (`jaxdamp.respond`)."
 _HEADERS = {"time": "time [s]", "stroke": "stroke [m]", "velocity": "velocity [m/s]", "force": "force [N]"}
-
-
-def _column(channel: str, values: ArrayLike, count: int) -> Float[np.ndarray, " time"]:
-    """A copy of a channel, of the length of the time."""
-    _checks.untraced(channel, values, MEASURED)
-    column = np.array(values, dtype=np.float64)
-    if column.ndim != 1 or len(column) != count:
-        _checks.refuse(channel, f"be a column of as many samples as the time, {count}", f"of shape {column.shape}")
-    return column
 
 
 @final
@@ -98,7 +88,7 @@ class BenchRun:
     def __post_init__(self) -> None:
         where = f"record {self.name!r}"
         for channel in (*_HEADERS, *(name for name in BESIDE if getattr(self, name) is not None)):
-            values = _column(channel, getattr(self, channel), len(self.time))
+            values = clock.channel_of(channel, getattr(self, channel), len(self.time))
             clock.check_numbers(values, channel, where)
             values.setflags(write=False)
             object.__setattr__(self, channel, values)
@@ -135,12 +125,12 @@ class BenchRun:
         A command that is an array, in its unit, is a channel that varies.
         """
         notes, count = tuple(notes), np.size(time)
-        stroke, force = _column("stroke", stroke, count), _column("force", force, count)
+        stroke, force = clock.channel_of("stroke", stroke, count), clock.channel_of("force", force, count)
         if velocity is None:
             velocity, how = estimate_velocity(time, stroke)
             notes = (*notes, how)
-        velocity, time = _column("velocity", velocity, count), _column("time", time, count)
-        warm = None if temperature is None else _column("temperature", temperature, count)
+        velocity, time = clock.channel_of("velocity", velocity, count), clock.channel_of("time", time, count)
+        warm = None if temperature is None else clock.channel_of("temperature", temperature, count)
         varies = np.ndim(command) > 0 if command is not None else False
         held = None if varies or command is None else float(np.asarray(command))
         return cls(
@@ -153,7 +143,7 @@ class BenchRun:
             held,
             source,
             notes,
-            command_channel=_column("command", command, count) if varies and command is not None else None,
+            command_channel=clock.channel_of("command", command, count) if varies and command is not None else None,
             command_unit=command_unit if varies else "",
         )
 

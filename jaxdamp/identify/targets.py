@@ -251,9 +251,9 @@ def _goals(targets: Mapping[str, Goal], tolerance: float) -> dict[str, tuple[flo
         _checks.refuse("targets", "be numbers by name", _checks.described(targets), "Write {'frequency': 1.2}.")
     goals = {}
     for name, goal in targets.items():
-        if isinstance(goal, Sequence) and (isinstance(goal, str) or len(goal) != 2):
+        if isinstance(goal, str) or np.shape(goal) not in ((), (2,)):
             _checks.refuse(f"targets[{name!r}]", "be a number, or it and its tolerance", goal, "Write `(1.2, 0.05)`.")
-        value, allowed = goal if isinstance(goal, Sequence) else (goal, tolerance * abs(goal))
+        value, allowed = goal if isinstance(goal, Sequence | np.ndarray) else (goal, tolerance * abs(goal))
         _checks.finite(f"targets[{name!r}]", value)
         _checks.positive(f"tolerance of targets[{name!r}]", allowed, "Write `(value, tolerance)`.")
         goals[name] = float(value), float(allowed)

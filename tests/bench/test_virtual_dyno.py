@@ -43,7 +43,7 @@ def test_printed_laws_give_the_records_of_xla(law, monkeypatch):
     printed = dyno.run(tests)
     monkeypatch.setattr(virtual_dyno, "printed_forces", lambda *_: None)
     for one, other in zip(printed, dyno.run(tests), strict=True):
-        np.testing.assert_allclose(one.force, other.force, rtol=0.0, atol=1e-9 * np.max(np.abs(other.force)))
+        np.testing.assert_allclose(one.force, other.force, rtol=0.0, atol=1e-11 * np.max(np.abs(other.force)))
         np.testing.assert_array_equal(one.temperature, other.temperature)
 
 
