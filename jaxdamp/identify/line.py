@@ -230,6 +230,8 @@ def _fitted(many: ManyFits) -> tuple[dict[str, np.ndarray], np.ndarray, dict[str
     sure &= np.array([status is not Status.LEFT_OUT for status in many.status])[:, None]
     values = np.where(sure, many.values, np.nan)
     moving = [j for j in range(values.shape[1]) if np.any(sure[:, j])]
+    if not moving:
+        _checks.refuse("dampers", "hold a number that the records of some determine", many.summary)
     names = [many.parameters[j] for j in moving]
     units = dict(zip(names, (many.free.owners[j].unit for j in moving), strict=True))
     return {name: values[:, j] for name, j in zip(names, moving, strict=True)}, many.standard_errors[:, moving], units

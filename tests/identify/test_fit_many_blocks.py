@@ -12,7 +12,7 @@ import xarray
 
 from jaxdamp.bench import BenchRun, DamperRecords, SineTest, VirtualDyno
 from jaxdamp.dampers import Bilinear
-from jaxdamp.identify import Status, fit_many, many, many_blocks
+from jaxdamp.identify import Status, control_charts, fit_many, many, many_blocks
 from jaxdamp.identify.many_blocks import DamperFits
 
 
@@ -184,6 +184,8 @@ def test_a_store_without_a_fit_is_described(tmp_path):
     assert json.loads(json.dumps(line.to_dict(), allow_nan=False))["dampers"]["0"]["status"] == "left_out"
     settled = dataclasses.replace(line, settings=(0.0, 1.0, 2.0))
     assert settled.unusual == ("0", "1", "2") and len(settled.table().rows) == 3
+    with pytest.raises(ValueError, match=r"`dampers` must hold a number .*, but is Bilinear: none of 3 dampers"):
+        control_charts(line, 3)
 
 
 def test_an_interrupted_fit_goes_on_and_parts_share_a_store(tmp_path, read, monkeypatch):
