@@ -81,7 +81,7 @@ class Lanes(NamedTuple):
 
     def mean(self, damper: int, of_records: Float[np.ndarray, " records"]) -> float:
         """The mean of a number of each record of a damper over its samples."""
-        sizes = [np.count_nonzero(part) for part in self.of_records(damper, self.used[damper])]
+        sizes = [np.count_nonzero(self.used[damper][place]) for place in self.problems[damper].places]
         return float(np.average(of_records, weights=sizes))
 
     def excess(
@@ -159,7 +159,7 @@ def judged(lanes: Lanes, end: SearchLanes, depends: Dependence | None) -> dict[s
         drift[i] = max(
             [float(_drift(problem.free, jnp.asarray(here.values), batch)) for batch in periodic], default=0.0
         )
-        percent[i], rmse[i], each = _errors(lanes, i, batches, here, settled=drift[i] <= DRIFT)
+        percent[i], rmse[i], each = _errors(lanes, i, batches, here, settled=bool(drift[i] <= DRIFT))
         by_record.append(each)
     errors_of_numbers = _standard_errors(end, noise, depends)
     named = {"values": values, "standard_errors": errors_of_numbers, "fit_percent": percent, "rmse": rmse}

@@ -211,7 +211,7 @@ class ManyFits(AbstractResult):
         for i, score in zip(fitted, _robust_scores(misfit[fitted], None), strict=True):
             if score > OUTLYING:
                 times = misfit[i] / np.median(misfit[fitted])
-                texts[i].append(f"its error is {times:.2g} times that of the others{self._mostly_of(i)}")
+                texts[i].append(f"its error is {times:.2g} times that of the others{self._mostly_of(int(i))}")
         for i, share in enumerate(self.share_left_out):
             if share > NOT_COUNTED + float(np.nanmedian(self.share_left_out)):
                 texts[i].append(f"{100.0 * share:.2g} % of its samples have less than half weight")

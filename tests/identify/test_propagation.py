@@ -3,6 +3,7 @@
 import dataclasses
 from functools import partial
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -150,7 +151,7 @@ def test_a_profile_goes_on_along_a_condition_of_the_law():
     assert low < compression.value < 4000.0 < high  # where the interval once ended at the value
     share, v = float(least_rebound(law.limit_velocity, law.transition_velocity)), runs[0].velocity
     rates = [(a, b, c, 0.3, 0.02) for a, b, c in (1.0 + np.eye(4, 3, -1)).tolist()]
-    ones, *twice = (Besinger(*each).force_velocity(jnp.asarray(v)) for each in rates)
+    ones, *twice = (jax.vmap(Besinger(*each).force_velocity)(jnp.asarray(v)) for each in rates)
     unit = [np.asarray(other - ones) for other in twice]
     left = runs[0].force - 400.0 * unit[2]
 
