@@ -17,7 +17,6 @@ NARROW = with_fitted_range(Linear(1000.0), FittedRange(velocity=(-0.1, 0.1)))
 CALLS: dict[type[Warning], Callable[[], object]] = {
     StartsInMotionWarning: lambda: respond(Lag(Linear(1000.0), 0.004), TIME, STROKE),
     OutsideFittedRangeWarning: lambda: respond(NARROW, TIME, STROKE),
-    DeprecationWarning: lambda: respond(Linear(1000.0), TIME, STROKE, method="step"),
     UserWarning: lambda: sweep(lambda point: {"root": jnp.sqrt(point["a"])}, {"a": [-1.0, 1.0]}),
 }
 

@@ -30,9 +30,6 @@ NOT_OFFERED = {  # arguments of library functions, and why
         "state": "for runs in pieces, of programs",
         "return_state": "for runs in pieces, of programs",
         "every": "the pictures and metrics need every instant",
-        "method": "deprecated",
-        "rtol": "deprecated",
-        "atol": "deprecated",
     },
     "tune.minimise": {
         "engine": "an object of Python",
@@ -106,10 +103,7 @@ TYPES = (  # pattern of one alternative of an annotation, and how it is written;
     (r"Mapping\[str, Axis\]", Written(words.axes, "NAME=VALUES")),
     (r"Mapping\[str, (float|int)[ |floatin]*\]", Written(words.named(float), "NAME=NUMBER")),
     (r"Mapping\[str, str( \| int)?( \| None)?\]", Written(words.named(str), "NAME=TEXT")),
-    (
-        r"Sequence\[(str|int)( \| int)\]",
-        Written(words.columns, "COLUMN"),
-    ),
+    (r"Sequence\[(str|int)( \| int)\]", Written(words.columns, "COLUMN")),
     (r"Sequence\[str\]", Written(words.words, "NAME,...")),
     (r"Sequence\[(float|int)[ |floatin]*\]", Written(words.numbers_in_order, "NUMBER,...")),
     (r"tuple\[(float|int)[ |floatin]*, (float|int)[ |floatin]*\]", Written(words.two, "FIRST:SECOND", repeated=False)),

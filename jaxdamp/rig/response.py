@@ -1,7 +1,7 @@
 """The force of a law under a prescribed stroke."""
 
 from abc import abstractmethod
-from typing import TYPE_CHECKING, Literal, TypedDict, Unpack, overload
+from typing import Literal, TypedDict, Unpack, overload
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -24,11 +24,7 @@ from jaxdamp.dampers import (
     warn_outside,
 )
 from jaxdamp.parameters import as_float
-from jaxdamp.rig.marching import Followed, march_states, solve_law, step_and_rate
-
-
-if TYPE_CHECKING:
-    import diffrax
+from jaxdamp.rig.marching import Followed, march_states, step_and_rate
 
 
 IN_MOTION = 0.1  # of the largest velocity, above which a record begins in motion
@@ -62,9 +58,6 @@ class ResponseSettings(TypedDict, total=False):
         engine: `simulation.Exponential(substeps=...)`, the steps that the laws bring, as when it is left out; or
             `simulation.Adaptive(...)`, a diffrax solver of their rates, as reference for stiff laws. Then the stroke
             between two instants is the cubic with the velocities at its ends.
-        method: deprecated: `"step"` or a diffrax solver. Pass `engine`.
-        rtol: deprecated: of a `method`.
-        atol: deprecated: of a `method`.
     """
 
     state: Float[ArrayLike, " states"] | None
@@ -72,15 +65,9 @@ class ResponseSettings(TypedDict, total=False):
     command: Float[ArrayLike, "..."] | None
     substeps: int
     engine: AbstractLawEngine | None
-    method: "str | diffrax.AbstractSolver | None"
-    rtol: float
-    atol: float
 
 
-DEFAULTS: ResponseSettings = {
-    "state": None, "temperature": None, "command": None, "substeps": 1, "engine": None, "method": None, "rtol": 1e-8,
-    "atol": 1e-10,
-}  # fmt: skip
+DEFAULTS: ResponseSettings = {"state": None, "temperature": None, "command": None, "substeps": 1, "engine": None}
 
 
 @overload
@@ -151,7 +138,7 @@ def respond(
     120.0
     """
     state, temperature, command = settings["state"], settings["temperature"], settings["command"]
-    substeps, engine, method = settings["substeps"], settings["engine"], settings["method"]
+    substeps, engine = settings["substeps"], settings["engine"]
     check_module("law", law, (AbstractDamper,), "respond(law, time, stroke, velocity)")
     instants, time, stroke = _checks.concrete(time), as_float(time), as_float(stroke)
     _check_record(instants, time, stroke, velocity)
@@ -160,10 +147,7 @@ def respond(
         _checks.refuse("substeps", "be 1 or more", substeps)
     dt, rate = step_and_rate(time, stroke, None if velocity is None else as_float(velocity))
     _refuse_strokes(law, stroke)
-    if method is not None:
-        _refuse_method(method, engine)
-    solver = None if isinstance(method, str) else method
-    if engine is not None or solver is not None:
+    if engine is not None:
         _refuse_beside_engine(temperature, command, substeps, state, return_state)
     if temperature is not None:
         temperature = _of_instants(law, temperature, time)
@@ -175,8 +159,6 @@ def respond(
     if engine is not None:
         check_module("engine", engine, (AbstractLawEngine,), "respond(law, time, stroke, engine=...)")
         force = engine.respond(law, time, stroke, rate)
-    elif solver is not None:
-        force = solve_law(law, time, stroke, rate, solver, settings["rtol"], settings["atol"])
     else:
         followed = Followed(temperature, command)
         begin = None if state is None else _checked_state(law, state, followed)
@@ -279,14 +261,3 @@ def _refuse_strokes(law: AbstractDamper, stroke: Signal) -> None:
             must = f"stay from {low:.4g} to {high:.4g} m for {type(term).__name__}"
             value = f"from {values.min():.4g} to {values.max():.4g} m"
             _checks.refuse("stroke", must, value, "The law's volumes are those at stroke zero: shift the stroke.")
-
-
-def _refuse_method(method: "str | diffrax.AbstractSolver", engine: AbstractLawEngine | None) -> None:
-    """Warn of the deprecated argument, and refuse what it never was."""
-    if isinstance(method, str) and method != "step":
-        remedy = "Pass `engine=simulation.Adaptive(diffrax.Kvaerno5())`."
-        _checks.refuse("method", "be 'step' or a diffrax solver", repr(method), remedy)
-    if engine is not None:
-        _checks.refuse("engine", "be given without `method`", repr(engine))
-    instead = "`engine=simulation.Adaptive(solver, rtol=..., atol=...)`, or leave it out for the steps of the laws"
-    warn(f"`method` of `respond` is deprecated: pass {instead}.", DeprecationWarning)

@@ -144,9 +144,6 @@ class Joined(AbstractRoad):
         """From the beginning of the first road to the end of the second [s]."""
         return self.first.span[0], self.at + self.second.span[1]
 
-    def reseeded(self, seed: int) -> None:
-        """None: what was joined is not drawn again."""
-
 
 def joined(first: AbstractRoad, second: AbstractRoad, *, at: ScalarLike | int | None = None) -> Joined:
     """The road `first` up to the time t1, then `second` from its own time 0, without a step between them.

@@ -36,11 +36,7 @@ def interpolate(
 
 
 class AbstractProcess(eqx.Module):
-    """What draws the samples of a random road."""
-
-    @abc.abstractmethod
-    def draw(self, seed: int | Array, count: int) -> Float[Array, " samples"]:
-        """So many heights [m]."""
+    """What draws the samples of a random road again."""
 
     @abc.abstractmethod
     def redraw(self, samples: Float[Array, " samples"], seed: int) -> Float[Array, " samples"]:

@@ -25,6 +25,26 @@ def flat_band(phase: Float[Array, " lines"], first: int, size: int) -> Float[Arr
     return jnp.fft.irfft(spectrum, size)
 
 
+@final
+class FlatBand(AbstractProcess):
+    """Cosines of one amplitude at neighbouring multiples of the inverse of the period."""
+
+    first: int = eqx.field(static=True)  # multiple
+    lines: int = eqx.field(static=True)  # number of multiples
+    holds_peak_to_peak: bool = eqx.field(static=True)  # instead of the RMS
+
+    def redraw(self, samples: Float[Array, " samples"], seed: int) -> Float[Array, " samples"]:
+        """Other heights [m] of the same spectrum, scaled to the same peak to peak if that was given."""
+        phase = jnp.angle(jnp.fft.rfft(samples)[self.first : self.first + self.lines])
+        other = flat_band(phase + uniform(seed, phase.shape, 2.0 * math.pi), self.first, samples.size)
+        extent = _peak_to_peak if self.holds_peak_to_peak else jnp.std
+        return extent(samples) / extent(other) * other
+
+
+def _peak_to_peak(samples: Float[Array, " samples"]) -> Scalar:
+    return largest(samples) + largest(-samples)
+
+
 def band_limited(
     low: float | int = 0.1,
     high: float | int = 50.0,
@@ -83,9 +103,14 @@ def band_limited(
         scale: Scalar = jnp.asarray(rms, float) / math.sqrt(0.5 * phase.size)
     else:
         _checks.positive("peak_to_peak", peak_to_peak)
-        scale = jnp.asarray(peak_to_peak, float) / (largest(shape) + largest(-shape))
+        scale = jnp.asarray(peak_to_peak, float) / _peak_to_peak(shape)
     return SampledRoad(
-        samples=(scale * shape)[:, None], driven_at=None, spacing=float(dt), periodic=True, ramp=float(ramp)
+        samples=(scale * shape)[:, None],
+        driven_at=None,
+        spacing=float(dt),
+        periodic=True,
+        ramp=float(ramp),
+        process=FlatBand(first, phase.size, rms is None),
     )
 
 
@@ -142,10 +167,6 @@ class FilteredNoise(AbstractProcess):
 
     deviation: Scalar  # standard deviation of the heights [m]
     correlation: Scalar  # of neighbouring samples
-
-    def draw(self, seed: int | Array, count: int) -> Float[Array, " samples"]:
-        """So many heights [m]."""
-        return _filtered(self.deviation, self.correlation, normal(seed, (count,)))
 
     def redraw(self, samples: Float[Array, " samples"], seed: int) -> Float[Array, " samples"]:
         """Other heights [m]: the probabilities of the noise are shifted."""
@@ -224,7 +245,7 @@ def iso8608_filtered(
     correlation = jnp.asarray(jnp.exp(-2.0 * math.pi * spacing * jnp.asarray(cutoff, float)))
     process = FilteredNoise(jnp.sqrt(filtered_noise_variance(density, cutoff)), correlation)
     return SampledRoad(
-        samples=process.draw(seed, samples)[:, None],
+        samples=_filtered(process.deviation, process.correlation, normal(seed, (samples,)))[:, None],
         driven_at=jnp.asarray(speed, float),
         spacing=float(spacing),
         periodic=False,

@@ -20,7 +20,6 @@ from jaxdamp._quickly import compiled_quickly
 from jaxdamp._traced import is_batched, look_behind
 from jaxdamp._types import Point, Scalar
 from jaxdamp._vectors import MemoryLayout
-from jaxdamp._warned import warn
 from jaxdamp.codegen import compiler
 from jaxdamp.configuration import one_at_a_time, target
 from jaxdamp.dampers import RangeUse, has_fitted_range
@@ -175,11 +174,6 @@ class Ride(eqx.Module):
             return ride
         time = self.dt * jnp.arange(self.heights.shape[0], dtype=float)
         return eqx.tree_at(lambda ride: ride.heights, ride, heights_under_wheels(vehicle, self.road, time))
-
-    def on_axles_of(self, vehicle: AbstractVehicle) -> "Ride":
-        """Deprecated: `of_vehicle` does the same."""
-        warn("`Ride.on_axles_of` is deprecated: use `of_vehicle`.", DeprecationWarning)
-        return self.of_vehicle(vehicle)
 
     def side_by_side(self) -> "Ride":
         """The same, compiled for many cars at a time, as `sweep` and `jax.vmap` of a ride compile it by themselves.

@@ -14,11 +14,9 @@ from jaxdamp._field_types import check_field_types, check_module
 from jaxdamp._settings import with_defaults
 from jaxdamp._traced import at_compile_time, behind, is_traced
 from jaxdamp._types import Scalar, ScalarLike, Signal
-from jaxdamp._warned import warn
 from jaxdamp.dampers import coverage, warn_outside
 from jaxdamp.parameters import modules_inside
 from jaxdamp.roads import AbstractRoad
-from jaxdamp.simulation.adaptive import Adaptive
 from jaxdamp.simulation.engine import AbstractEngine, RunState, check_control, check_demands, chosen_engine
 from jaxdamp.simulation.equations import Equations, RoadEdges
 from jaxdamp.simulation.exponential import Exponential
@@ -93,9 +91,6 @@ def simulate(
     refuse_stacked(vehicle)
     if engine is not None:
         check_module("engine", engine, (AbstractEngine,), "simulate(vehicle, road, engine=...)")
-    if any(settings[name] is not None for name in ("method", "rtol", "atol")):
-        engine = _by_method(settings)
-        substeps = None
     engine, dt = chosen_engine(engine, Exponential(substeps=substeps), dt, substeps)
     system = vehicle.system()
     if state is not None:
@@ -170,21 +165,6 @@ def _edges(
     before = at(2.0 * time[0] - time[1], 2.0 * heights[0] - heights[1]) if goes_on[0] else None
     after = at(2.0 * time[-1] - time[-2], 2.0 * heights[-1] - heights[-2]) if goes_on[1] else None
     return RoadEdges(before, after)
-
-
-def _by_method(asked: SimulationSettings) -> AbstractEngine:
-    """The engine that a deprecated `method` means."""
-    method, rtol, atol = asked["method"], asked["rtol"], asked["atol"]
-    if asked["engine"] is not None:
-        _checks.refuse("engine", "be given without `method`, `rtol` and `atol`", repr(asked["engine"]))
-    if isinstance(method, str):
-        _checks.one_of("method", method, ["exponential", "diffrax"])
-    instead = "`engine=simulation.Adaptive(solver, rtol=..., atol=...)` or `engine=simulation.Exponential()`"
-    warn(f"`method`, `rtol` and `atol` of `simulate` are deprecated: pass {instead}.", DeprecationWarning)
-    if method is None or method == "exponential":
-        return Exponential(substeps=asked["substeps"])
-    solver = None if isinstance(method, str) else method
-    return Adaptive(solver, 1e-8 if rtol is None else rtol, 1e-10 if atol is None else atol)
 
 
 def _strides(count: int, every: int, dt: float) -> None:

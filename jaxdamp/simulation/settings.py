@@ -1,13 +1,9 @@
 """The keywords of simulations, and their defaults."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, TypedDict
+from typing import TypedDict
 
 from jaxdamp.simulation.engine import AbstractEngine, RunState
-
-
-if TYPE_CHECKING:
-    import diffrax
 
 
 class Run(TypedDict, total=False):
@@ -41,21 +37,13 @@ class SimulationSettings(Run, total=False):
             `substeps` (`simulation.substeps_needed`), or a `TracedStepWarning` says what is assumed.
         every: save every so many-th instant only, of long runs. The motion is the same, but metrics and the energy
             balance then know no more than what is saved; `Ride` gathers metrics at every instant and saves none.
-        method: deprecated: `"exponential"`, `"diffrax"` or a solver of diffrax. Pass `engine`.
-        rtol: deprecated: of a `method`.
-        atol: deprecated: of a `method`.
     """
 
     start: Mapping[str, float] | None
     state: RunState | None
     substeps: int | None
     every: int
-    method: "str | diffrax.AbstractSolver | None"
-    rtol: float | None
-    atol: float | None
 
 
 RUN: Run = {"duration": None, "dt": None, "engine": None}
-SIMULATION: SimulationSettings = {
-    **RUN, "start": None, "state": None, "substeps": None, "every": 1, "method": None, "rtol": None, "atol": None
-}  # fmt: skip
+SIMULATION: SimulationSettings = {**RUN, "start": None, "state": None, "substeps": None, "every": 1}

@@ -90,10 +90,9 @@ def test_another_vehicle_has_the_road_under_its_own_axles():
     value, slope = jax.jvp(of_vehicle, start, way)
     expected = jax.jvp(lambda distance: ride({"rear_distance": distance})[RMS], start, way)
     np.testing.assert_allclose((value, slope), expected, rtol=1e-9)
-    with pytest.warns(DeprecationWarning, match="use `of_vehicle`"):
-        old = ride.on_axles_of(replace(car, {"rear_distance": 2.0}))
-    assert old.heights is not None and ride.heights is not None
-    assert not np.array_equal(old.heights, ride.heights)
+    longer = ride.of_vehicle(replace(car, {"rear_distance": 2.0}))
+    assert longer.heights is not None and ride.heights is not None
+    assert not np.array_equal(longer.heights, ride.heights)
 
 
 ON_TWO_DEVICES = """

@@ -185,10 +185,6 @@ def test_a_solver_is_not_needed_without_states():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (
-            lambda: {"method": "implicit"},
-            r"`method` must be 'step' or a diffrax solver, but is 'implicit'. Pass `engine=simulation\.Adaptive",
-        ),
         (lambda: {"engine": Adaptive(), "substeps": 2}, "`substeps` must be left out beside an engine"),
         (lambda: {"engine": Adaptive(rtol=0.0)}, "`rtol` must be positive"),
         (lambda: {"engine": Adaptive(atol=-1.0)}, "`atol` must be positive"),
@@ -204,15 +200,6 @@ def test_an_engine_that_cannot_work_says_so(options, message):
     t, x, v = (a[:3] for a in sine(1e-3))
     with pytest.raises(ValueError, match=message):
         respond(Lag(Linear(1.0), 1e-9), t, x, v, **options())
-
-
-def test_the_method_of_before_works_with_a_warning():
-    t, x, v = sine(1e-3)
-    law = Lag(Linear(1500.0), 0.01)
-    for method, engine in (("step", None), (diffrax.Tsit5(), Adaptive())):
-        with pytest.warns(DeprecationWarning, match="pass `engine=simulation.Adaptive"):
-            found = respond(law, t, x, v, method=method)
-        np.testing.assert_array_equal(found, respond(law, t, x, v, engine=engine))
 
 
 # ---- constant velocity

@@ -1,3 +1,5 @@
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -110,3 +112,18 @@ def test_seeds_can_be_batched():
 def test_errors(arguments, message):
     with pytest.raises(ValueError, match=message):
         road(**arguments)
+
+
+@pytest.mark.parametrize("held", [{"rms": 0.002}, {"rms": None, "peak_to_peak": 0.01}])
+def test_drawn_again_it_keeps_its_spectrum_and_size(held):
+    original: Any = road(**held)
+    again, other = (original.reseeded(seed) for seed in (5, 6))
+    elsewhere: Any = road(seed=2, **held).reseeded(5)
+    size = jnp.std if held["rms"] else jnp.ptp
+    power = np.abs(np.fft.rfft([each.samples[:, 0] for each in (original, again, other)])) ** 2
+    for one, of in zip((again, other), power[1:], strict=True):
+        assert float(size(one.samples)) == pytest.approx(float(size(original.samples)), rel=1e-12)
+        np.testing.assert_allclose(of / of.sum(), power[0] / power[0].sum(), rtol=1e-9, atol=1e-15)
+    samples = [each.samples[:, 0] for each in (original, again, other, elsewhere)]
+    np.testing.assert_allclose(np.corrcoef(samples), np.eye(4), atol=4 / np.sqrt(1580))
+    np.testing.assert_array_equal(original.reseeded(5).samples, again.samples)

@@ -1,3 +1,5 @@
+from typing import Any
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -27,6 +29,16 @@ def test_the_end_of_a_record_is_where_the_next_road_begins():
     assert road.duration is None
     with pytest.raises(ValueError, match=r"`time` must stay within"):
         road.height(np.array([-0.5]))
+
+
+def test_random_parts_are_drawn_again():
+    bump, rough = cosine_bump(0.1, start=0.1, duration=0.5), iso8608("C", 10.0, seed=0)
+    road, time = joined(bump, rough, at=1.0), np.linspace(0.0, 3.0, 31)
+    other: Any = road.reseeded(3)
+    expected = joined(bump, rough.reseeded(3), at=1.0).height(time)
+    np.testing.assert_array_equal(other.height(time), expected)
+    assert not np.allclose(road.height(time), expected)
+    assert joined(bump, RECORD, at=1.0).reseeded(3) is None
 
 
 def test_three_roads_and_several_axles():

@@ -2,7 +2,6 @@
 
 from typing import Any, cast, final
 
-import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -67,17 +66,6 @@ class AdamsBashforth(AbstractFixedStep):
 # ---- what a caller chooses
 
 
-def test_the_engine_is_the_method_of_before():
-    for method, options, engine in (
-        ("exponential", dict[str, Any](substeps=2), Exponential(substeps=2)),
-        ("diffrax", dict[str, Any](rtol=1e-6), Adaptive(rtol=1e-6)),
-        (diffrax.Tsit5(), dict[str, Any](rtol=1e-6), Adaptive(rtol=1e-6)),
-    ):
-        with pytest.warns(DeprecationWarning, match=r"pass `engine=simulation\.Adaptive"):
-            before = simulate(CAR, BUMP, duration=0.1, method=method, **options)
-        np.testing.assert_array_equal(before.motion, simulate(CAR, BUMP, duration=0.1, engine=engine).motion)
-
-
 def test_a_step_of_the_engine_is_the_spacing_of_the_instants():
     asked, own = simulate(CAR, BUMP, duration=0.1, dt=2e-3), simulate(CAR, BUMP, duration=0.1, engine=Exponential(2e-3))
     np.testing.assert_array_equal(asked.motion, own.motion)
@@ -102,8 +90,6 @@ def test_engines_refuse_what_they_cannot_be():
         Adaptive("Tsit5")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="`substeps` must be a whole number, 1 or more, but is 0"):
         Exponential(substeps=0)
-    with pytest.raises(ValueError, match="`engine` must be given without `method`"):
-        simulate(CAR, BUMP, duration=0.1, engine=Exponential(), method="diffrax")
     with pytest.raises(ValueError, match="`engine` must not be given on a white road"):
         Ride(CAR, roads.white("C", 20.0), engine=Exponential())
 

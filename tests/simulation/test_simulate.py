@@ -239,7 +239,6 @@ def test_duration_of_the_road_is_used():
         ({"every": 0}, r"`every` must be a whole number of instants, 1 or more, but is 0"),
         ({"every": 7}, r"`every` must divide the 200 steps.*Pass `duration=0.98` or `duration=1.015`"),
         ({"dt": 2.0}, r"`dt` must be shorter than the run"),
-        ({"method": "exponental"}, r"`method` must be one of.*Did you mean 'exponential'"),
         (
             {"road": roads.sine(0.01, frequency=1.0), "duration": None},
             r"`duration` must be given.*Pass `duration=10.0`",
