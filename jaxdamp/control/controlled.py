@@ -84,6 +84,9 @@ class Controlled(AbstractVehicle):
     rate_limit: RateLimit | None = None
 
     def __check_init__(self) -> None:
+        if self.car.passive is not self.car:
+            remedy = "Give the policies of all dampers to one: `policy={'front_damper': ..., 'rear_damper': ...}`."
+            _checks.refuse("car", "have no controller yet", f"a {type(self.car).__name__}", remedy)
         _checks.positive("period", self.period)
         if not self.delay >= 0.0:
             _checks.refuse("delay", "not be negative", self.delay)

@@ -140,7 +140,10 @@ def respond(
     state, temperature, command = settings["state"], settings["temperature"], settings["command"]
     substeps, engine = settings["substeps"], settings["engine"]
     check_module("law", law, (AbstractDamper,), "respond(law, time, stroke, velocity)")
-    instants, time, stroke = _checks.concrete(time), as_float(time), as_float(stroke)
+    instants = _checks.concrete(time)
+    if isinstance(time, np.ndarray) and time.size:  # before it becomes single: times of day need double precision
+        time = time - time.flat[0]
+    time, stroke = as_float(time), as_float(stroke)
     _check_record(instants, time, stroke, velocity)
     _checks.untraced("substeps", substeps, "The number of steps is part of a compiled program: give a plain number.")
     if substeps < 1:

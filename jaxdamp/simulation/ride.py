@@ -31,7 +31,7 @@ from jaxdamp.simulation.equations import Equations, settled
 from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.notes import range_uses
 from jaxdamp.simulation.observer import MetricObserver, recorded
-from jaxdamp.simulation.run import refuse_stacked, run_check, sampled
+from jaxdamp.simulation.run import refuse_stacked, run_check, sampled, warn_of_missed_event
 from jaxdamp.simulation.stationary import (
     refuse_without_stationary_motion,
     stationary_dampers,
@@ -124,7 +124,9 @@ class Ride(eqx.Module):
             return
         engine, self.dt = chosen_engine(engine, Exponential(substeps=substeps), dt, substeps)
         _, self.heights = sampled(vehicle, road, duration, self.dt)
-        check_control(engine, vehicle.system(), self.dt, (self.heights.shape[0] - 1) * self.dt)
+        length = (self.heights.shape[0] - 1) * self.dt
+        check_control(engine, vehicle.system(), self.dt, length)
+        warn_of_missed_event(road, self.heights, length)
         self.road = road if delays_by_itself(vehicle, road) else None
         self.engine = engine.prepared(run_check(vehicle, vehicle.system(), road, self.heights, self.dt))
         self.layout = self.engine.layout(2 * len(vehicle.coordinates), side_by_side=False)

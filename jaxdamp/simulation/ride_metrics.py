@@ -62,8 +62,15 @@ def comfort(response: "Response") -> dict[str, Comfort]:
 
     Arguments:
         response: the run, or a part of it.
+
+    Raises:
+        ValueError: less than a second, over which MTVV is a mean.
     """
     layout, dt = response.system.layout, _step(response)
+    length = _checks.concrete(response.time.size * dt)
+    if length is not None and length < 1.0 - 1e-9:
+        must = "be 1 s or longer for comfort by ISO 2631-1, whose MTVV is the RMS of a second"
+        _checks.refuse("duration", must, f"{response.time.size * float(dt) - float(dt):g} s")
     names = dict.fromkeys(m.channel for m in layout.metrics if layout.by_name[m.channel].kind.weighting)
 
     def of(name: str) -> Comfort:

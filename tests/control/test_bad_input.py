@@ -65,12 +65,13 @@ def test_commands_that_stay_at_a_limit_are_said():
         (lambda: Ride(_delayed(0.0), ROAD, duration=1.0)({"car.damper.levels.1": 2.0}), "levels"),
         (lambda: _command(1.5), "`Scheduled.command` must be between 0 and 1, but is 1.5"),
         (lambda: Controlled(quarter(Linear(1e3)), Skyhook()), "which takes a command"),
+        (lambda: Controlled(_delayed(0.0), Skyhook()), "`car` must have no controller yet, but is a Controlled"),
         (
             lambda: simulate(Controlled(QUARTER, Skyhook(), period=7.5e-4), ROAD, duration=1.0),
             "`period` must be a whole",
         ),
     ],
-    ids=["delay", "delay of a ride", "levels are no parameter", "command", "no command", "period"],
+    ids=["delay", "delay of a ride", "levels are no parameter", "command", "no command", "two controllers", "period"],
 )
 def test_what_cannot_be_controlled_is_refused(make, message):
     with pytest.raises(ValueError, match=message):

@@ -139,6 +139,13 @@ def test_time_in_single_precision():
     assert respond(law, jnp.asarray(t), jnp.asarray(x), jnp.asarray(x)).dtype == jnp.float32
 
 
+def test_times_of_day_in_single_precision():
+    t, x, v = sine(1e-3)
+    with jax.enable_x64(False):
+        law = Lag(Linear(1500.0), 0.01)
+        np.testing.assert_array_equal(respond(law, t + 1.7e9, x, v), respond(law, (t + 1.7e9) - 1.7e9, x, v))
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

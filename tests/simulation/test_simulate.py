@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import scipy.integrate
 
-from jaxdamp import dampers, metrics, roads, simulate
+from jaxdamp import Ride, dampers, metrics, roads, simulate
 from jaxdamp.parameters import replace
 from jaxdamp.simulation import Adaptive, Exponential
 from jaxdamp.simulation.observer import recorded
@@ -262,6 +262,21 @@ def test_refuses_runs_that_make_no_sense(change, message):
     arguments = {"road": sampled, "duration": 1.0, "dt": 5e-3} | change
     with pytest.raises(ValueError, match=message):
         simulate(quarter_car_000(), **arguments)
+
+
+def test_a_run_that_ends_before_its_bump_says_so():
+    late = roads.superposed(roads.cosine_bump(0.06, start=1.0, duration=0.25), roads.step(0.05, start=1.2))
+    for drive in (simulate, Ride):
+        with pytest.warns(UserWarning, match="level for the whole run of 0.8 s: its bump comes later"):
+            drive(quarter_car_000(), late, duration=0.8)
+    _, state = simulate(quarter_car_000(), late, duration=0.8, return_state=True)  # the bump is in the next part
+    simulate(quarter_car_000(), late, duration=0.8, state=state)
+
+
+def test_comfort_of_less_than_a_second_is_refused():
+    response = simulate(quarter_car_000(), BUMP, duration=0.8)
+    with pytest.raises(ValueError, match=r"`duration` must be 1 s or longer for comfort.* but is 0\.8 s"):
+        response.comfort()
 
 
 def test_a_traced_road_that_would_repeat_or_be_skipped_is_refused():
