@@ -27,6 +27,9 @@ class ChannelKind(enum.Enum):
     STROKE = "deflection between two points, extension positive", "m"
     DAMPER_VELOCITY = "rate of a deflection", "m/s"
     FORCE = "force of one law", "N"
+    TWIST = "angle across a link", "rad"
+    TWIST_VELOCITY = "rate of an angle across a link", "rad/s"
+    MOMENT = "moment of one law across an angle", "N m"
     COMMAND = "command of a damper", ""
     ROAD_HEIGHT = "height of the road under a wheel", "m"
     TYRE_LOAD = "load of a wheel minus the static load", "N"
@@ -59,6 +62,8 @@ class Channel(NamedTuple):
 
 Measured = tuple[Channel, Point]  # a channel, and its linear combination of `signals`
 ANGULAR = (ChannelKind.ANGLE, ChannelKind.ANGULAR_ACCELERATION)
+OF_LINK = (ChannelKind.STROKE, ChannelKind.DAMPER_VELOCITY, ChannelKind.FORCE)
+OF_ANGULAR_LINK = (ChannelKind.TWIST, ChannelKind.TWIST_VELOCITY, ChannelKind.MOMENT)
 
 
 def signals(frame: Frame) -> list[str]:
@@ -152,17 +157,20 @@ def _of_elements(part: Link | Wheel) -> list[Measured]:
     """Deflection, its rate and the forces of a part with laws."""
     if not part.elements:
         return []
+    angular = isinstance(part, Link) and part.angular
+    of_stroke, of_velocity, of_force = OF_ANGULAR_LINK if angular else OF_LINK
     stroke, velocity = prefixed(part.name, "stroke"), prefixed(part.name, "damper_velocity")
-    what = f"deflection{f' of {part.name}' if part.name else ''}, extension positive"
+    what = f"{'angle' if angular else 'deflection'}{f' of {part.name}' if part.name else ''}, extension positive"
     channels = [
-        (Channel(stroke, ChannelKind.STROKE, part.name, what), _deflection(part, "position")),
-        (Channel(velocity, ChannelKind.DAMPER_VELOCITY, part.name, f"rate of the {what}"), _deflection(part, "rate")),
+        (Channel(stroke, of_stroke, part.name, what), _deflection(part, "position")),
+        (Channel(velocity, of_velocity, part.name, f"rate of the {what}"), _deflection(part, "rate")),
     ]
     for element in part.elements:
         name = prefixed(part.name, element.name)
-        words = f"force of {name}{_share(element, part)}, positive where it resists extension"
+        effect = "moment" if angular else "force"
+        words = f"{effect} of {name}{_share(element, part)}, positive where it resists extension"
         force = Point({f"force:{name}": 1.0 / element.count})  # the force of one of several equal laws
-        channels.append((Channel(f"{name}_force", ChannelKind.FORCE, name, words), force))
+        channels.append((Channel(f"{name}_force", of_force, name, words), force))
     return channels
 
 

@@ -211,7 +211,7 @@ class Link(AbstractPart):
 
     A link with laws has the channels `stroke` [m], `damper_velocity` [m/s] (of the extension: with a `MotionRatio` or a
     `Linkage` the damper's own is ratio times that) and the force [N] of each law, after the name of the link. Across an
-    angle, as in an anti-roll bar, the units are N m/rad, N m s/rad, rad and N m.
+    angle, as in an anti-roll bar, pass `angular=True`: the units are N m/rad, N m s/rad, rad, rad/s and N m.
 
     Arguments:
         name: name of the link, may be empty.
@@ -220,6 +220,7 @@ class Link(AbstractPart):
         damping: coefficient of the linear dashpot.
         elements: laws parallel to them.
         sides: number of sides of the vehicle that it stands for; only for descriptions.
+        angular: whether the extension is an angle [rad], and the laws give moments [N m].
     """
 
     name: str = eqx.field(static=True)
@@ -228,6 +229,7 @@ class Link(AbstractPart):
     damping: Number = parameter("N s/m", "coefficient of the linear dashpot", nonnegative, default=0.0)
     elements: tuple[Element, ...] = ()
     sides: int = eqx.field(static=True, default=1)
+    angular: bool = eqx.field(static=True, default=False)
 
 
 @final

@@ -152,3 +152,15 @@ def test_gradients_of_ridden_metrics_agree_with_differences():
 def test_refuses_parts_that_do_not_fit(build, message):
     with pytest.raises(ValueError, match=message):
         build()
+
+
+def test_a_law_across_an_angle_has_angles_and_moments():
+    body = Body("sprung", 1200.0, pitch_inertia=2000.0)
+    suspension = Link("heave", body.at() - WHEEL.at(), 60e3, elements=(DAMPER,))
+    twist = Link("arm", body.pitch, 5e4, elements=(Element("bush", dampers.Linear(800.0)),), angular=True)
+    car = LumpedVehicle(Frame((body, WHEEL), (suspension, twist), (TYRE,)))
+    units = {"arm_stroke": "rad", "arm_damper_velocity": "rad/s", "arm_bush_force": "N m", "heave_stroke": "m"}
+    assert {name: car.units[name] for name in units} == units
+    of_metrics = {m.name: m.unit(car.units) for m in car.ride_metrics}
+    assert of_metrics["arm_working_space_rms"] == "rad" and of_metrics["arm_bush_dissipated_power"] == "W"
+    assert car.goal_metrics("travel") == ["heave_working_space_peak_to_peak"]
