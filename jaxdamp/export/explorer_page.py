@@ -20,12 +20,12 @@ from jaxdamp._words import class_words, first_upper, in_words, metric_words
 from jaxdamp._writing import write_whole
 from jaxdamp.bench import BenchRun
 from jaxdamp.codegen import Atom, JavaScript, PrintedFunction, Program, lower, symbols
-from jaxdamp.dampers import AbstractDamper, law_name
+from jaxdamp.dampers import AbstractDamper, law_name, takes_command
 from jaxdamp.export._law_program import LawNumber, LawProgram
 from jaxdamp.export._ride_program import RideProgram
 from jaxdamp.export.module_file import to_json
 from jaxdamp.metrics import Metric
-from jaxdamp.parameters import weight
+from jaxdamp.parameters import matching, parameters, weight
 from jaxdamp.roads import AbstractRoad, cosine_bump, iso8608
 from jaxdamp.simulation import Ride, axle_timing
 from jaxdamp.vehicles import UNKNOWN_SPEED, AbstractVehicle, Point, drawing_script, matrix, presets
@@ -174,7 +174,7 @@ def to_explorer(
         "count": count,
         "substeps": substeps,
         "road": _of_roads(speed, duration, seed, road_class) | _of_profile(road, ride),
-        "records": [_of_record(run) for run in records],
+        "records": [_of_record(run, (law, law if baseline is None else baseline)) for run in records],
     }
     programs = "".join(closed(name, texts) for name, texts in functions.items())
     programs += closed("ROAD", {"bump": bump_function()})
@@ -306,7 +306,9 @@ def _range(number: LawNumber, value: float, largest: float) -> tuple[float, floa
 def _of_metric(metric: Metric, vehicle: AbstractVehicle) -> Contents:
     title = metric_words(metric.name) + (f", {metric.weighting}" if metric.weighting else "")
     unit, main = metric.unit(vehicle.units), bool(_MAIN.match(metric.name))
-    return {"name": metric.name, "title": title, "unit": unit, "main": main, "signed": metric.statistic.signed}
+    turned = display().sign == COMPRESSION and display().signed(metric.name)
+    known = {"name": metric.name, "title": title, "unit": unit, "main": main}
+    return known | {"signed": metric.statistic.signed, "turned": turned}
 
 
 def _of_roads(speed: float, duration: float, seed: int, road_class: str) -> Contents:
@@ -323,8 +325,8 @@ def _of_roads(speed: float, duration: float, seed: int, road_class: str) -> Cont
     return {"class": road_class, "speed": speed, "iso": lines, "profile": None}
 
 
-def _of_record(run: BenchRun) -> Contents:
-    """A record for the page: every sample, or so few of them as it takes to drive the law, from the beginning."""
+def _of_record(run: BenchRun, laws: Sequence[AbstractDamper]) -> Contents:
+    """A record for the page: every sample, or so few of them as it takes to drive the laws, from the beginning."""
     per_cycle = run.sampling_rate / max(run.frequency, 1.0 / run.duration)
     stride = max(1, min(int(per_cycle / _PER_CYCLE), -(-len(run) // _SAMPLES)))
     chosen = slice(0, _SAMPLES * stride, stride)
@@ -332,7 +334,18 @@ def _of_record(run: BenchRun) -> Contents:
     every = "every sample" if stride == 1 else f"one sample in {stride}"
     note = f"{every} of {len(run)}" + ("" if len(run) <= _SAMPLES * stride else f", up to the {_SAMPLES * stride}th")
     about = {"name": run.name, "dt": stride / run.sampling_rate, "command": run.command, "note": note}
+    about |= {"beyond": " and ".join(dict.fromkeys(name for law in laws for name in _beyond(run, law)))}
     return about | {key: _packed(values) for key, values in shown.items()}
+
+
+def _beyond(run: BenchRun, law: AbstractDamper) -> list[str]:
+    """What a record states for a law that the page does not follow, in words."""
+    names = [f"the {in_words(name)}" for name in run.settings if matching([p.path for p in parameters(law)], name)]
+    if run.command_channel is not None and takes_command(law):
+        names.append("the varying command")
+    if law.traits().temperature_dependent and (run.temperature is not None or "temperature" in run.settings):
+        names.append("the temperature")
+    return names
 
 
 def _packed(values: object) -> str:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, ParamSpec, Protocol, TypeAlias, Unpack, cast, overload, runtime_checkable
 
@@ -18,7 +19,7 @@ from jaxdamp.bench import BenchRun, RideRecord, as_runs, usable
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.comparison import NAMED, AbstractComparison, naming_only, side_by_side
 from jaxdamp.identify.fitting import NUMERICAL, fit
-from jaxdamp.identify.held_out import HeldOut, on_records, without_parts
+from jaxdamp.identify.held_out import on_records, without_parts
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import OFFSET, Machine, absent_paths, started_machine
 from jaxdamp.identify.model import on_rig
@@ -175,11 +176,10 @@ def compare(
     runs = usable(as_runs(runs, call=call), bad_records, robust=robust)
     held_out = usable(as_runs(held_out, "held_out"), bad_records, robust=robust, argument="held_out")
     with Progress("Fitting") as shown:
-        number = 0
+        numbers = itertools.count(1)
 
         def counted(name: str) -> None:
-            nonlocal number
-            number += 1
+            number = next(numbers)
             shown(f"{name}, {number} of {len(laws)}" if number <= len(laws) else f"{name}, made simpler")
 
         fits = fit_each(laws, runs, held_out, rig=rig, scheduled=scheduled, progress=progress or counted, **settings)
@@ -234,9 +234,7 @@ def fit_each(
         own = {**own, "rig": rig, "freeze": (*own["freeze"], *held)}
         return name, start, tuple(runs), tuple(held_out), scheduled, own
 
-    def kept(
-        inputs: tuple[object, ...], compute: Callable[[], tuple[Rung | Failure, list[PrintedLaw]]]
-    ) -> Rung | Failure:
+    def kept(inputs: tuple[object, ...], compute: Callable[[], Computed]) -> Rung | Failure:
         def outcome() -> Rung | Failure:
             result, printed = compute()
             remember(printed)
@@ -279,7 +277,10 @@ def _outcome(
     try:
         by_setting = fit_scheduled(start, runs, progress=lambda text: None, **how) if scheduled else None
         result = by_setting.result if by_setting else fit(start, runs, **how)
-        judged = _judged(start, result, held_out, scheduled)
+        if held_out:
+            judged = on_records(result, held_out)
+        else:
+            judged = None if isinstance(start, AbstractTrainedStart) else without_parts(result, in_time=scheduled)
         _ = result.error_shares  # which the table needs, computed here beside those of other laws
     except NUMERICAL as error:
         return Failure(name, str(error))
@@ -298,10 +299,3 @@ def _paths(start: Start, runs: Sequence[BenchRun], rig: Machine) -> list[str]:
         return [p.path for p in parameters(on_rig(law, machine)) if p.path not in left_out]
     except NUMERICAL:
         return []
-
-
-def _judged(start: Start, result: FitResult, held_out: Sequence[BenchRun], scheduled: bool) -> HeldOut | None:
-    """The errors of a fit on records held out, or on parts of its own."""
-    if held_out:
-        return on_records(result, held_out)
-    return None if isinstance(start, AbstractTrainedStart) else without_parts(result, in_time=scheduled)

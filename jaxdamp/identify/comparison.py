@@ -181,10 +181,7 @@ def side_by_side(
 def naming_only(options: Mapping[str, V], own: Sequence[str], every: Iterable[Sequence[str]]) -> dict[str, V]:
     """Options of a fit that name only parameters that the law or the vehicle has, or that none has: that is refused.
 
-    Arguments:
-        options: of the comparison.
-        own: paths of the parameters of this law or vehicle.
-        every: those of each of the comparison.
+    `own` are the paths of the parameters of this one, `every` those of each of the comparison.
     """
     paths = [*every]
     named = {name: cast(V, _of(own, paths, cast(Names, value))) for name, value in options.items() if name in NAMED}

@@ -6,6 +6,7 @@ from jaxdamp import _checks
 from jaxdamp.bench import BenchRun, Contradiction, contradictions, initial_temperature, pairs_in_words
 from jaxdamp.dampers import takes_command
 from jaxdamp.identify.model import Model, law_of, rig_of
+from jaxdamp.identify.settings import FitSettings
 from jaxdamp.identify.stated import stated_parameters
 
 
@@ -14,10 +15,6 @@ def contradicting(model: Model, runs: Sequence[BenchRun]) -> list[Contradiction]
 
     A law may take a command; a law or a machine may depend on the temperature; records may state a parameter of the
     law, such as a gas pressure. All count if all records state them.
-
-    Arguments:
-        model: the law, on its machine if there is one.
-        runs: the records.
     """
     law, rig = law_of(model), rig_of(model)
     warms = law.traits().temperature_dependent or (rig is not None and "heat" in rig.effects())
@@ -31,16 +28,14 @@ def contradicting(model: Model, runs: Sequence[BenchRun]) -> list[Contradiction]
     return [pair for group in groups.values() for pair in contradictions(group, same_command=same_command)]
 
 
+def refuse_several_laws(model: Model, runs: Sequence[BenchRun], settings: FitSettings, argument: str = "runs") -> None:
+    """Refuse records that no one law can follow, unless they are to be kept or have own numbers."""
+    if settings["bad_records"] != "keep" and not settings["per_record"] and settings["initial_state"] != "estimated":
+        refuse_contradicting(contradicting(model, runs), argument)
+
+
 def refuse_contradicting(found: Sequence[Contradiction], argument: str = "runs") -> None:
-    """Refuse to fit one law to records that contradict each other, if there are any.
-
-    Arguments:
-        found: what contradicts.
-        argument: what the caller calls the records.
-
-    Raises:
-        ValueError: records of the same motion with different forces.
-    """
+    """Refuse to fit one law to records that contradict each other, if there are any."""
     if not found:
         return
     remedy = (

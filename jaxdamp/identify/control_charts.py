@@ -199,11 +199,7 @@ def _run_length(
 ) -> float:
     """L(0) of L(u) = 1 + L(0) P(u) + ∫ L(y) f(y | u) dy, by Gauss-Legendre quadrature.
 
-    Arguments:
-        density: f(y | u).
-        low: from where on there is no signal.
-        high: up to where.
-        at_zero: P(u), the probability to return to exactly zero.
+    f(y | u) is the `density`, P(u) the probability to return to exactly zero; there is no signal from `low` to `high`.
     """
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     nodes, weights = 0.5 * (high - low) * nodes + 0.5 * (high + low), 0.5 * (high - low) * weights
@@ -223,11 +219,9 @@ def _density(x: np.ndarray) -> np.ndarray:
 
 
 def signals(chart: AbstractChart, scores: Sequence[float] | np.ndarray) -> np.ndarray:
-    """After which numbers a chart signals: 1 above its limit, −1 below it, 0 within or where a number is missing.
+    """After which scores (distances from the centre in standard deviations) a chart signals.
 
-    Arguments:
-        chart: the chart.
-        scores: distances from the centre in standard deviations.
+    1 above its limit, −1 below it, 0 within or where a number is missing.
     """
     scores = np.asarray(scores, np.float64)
     high, low = chart.statistics(scores)

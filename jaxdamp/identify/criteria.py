@@ -83,13 +83,9 @@ class Priors(AbstractResiduals):
         rows[np.arange(self.size), np.concatenate(taken)], rows[:, -1] = weight, -weight * mean
         return rows
 
-    def total_weight(self) -> Float[Array, ""]:
-        """None of the records."""
-        return jnp.zeros(())
 
-
-def priors_on(free: FreeParameters, priors: Mapping[str, tuple[float, float]], noise: float) -> tuple[Priors, ...]:
-    """The residuals of stated priors `{name: (mean, standard deviation)}`."""
+def priors_on(free: FreeParameters, priors: Mapping[str, tuple[float, float]]) -> tuple[Priors, ...]:
+    """The residuals of stated priors `{name: (mean, standard deviation)}`, for weighted samples with the noise 1."""
     chosen: dict[str, tuple[float, float]] = {}
     for name, pair in priors.items():
         if np.shape(pair) != (2,) or not np.all(np.isfinite(pair)) or not pair[1] > 0:
@@ -100,7 +96,7 @@ def priors_on(free: FreeParameters, priors: Mapping[str, tuple[float, float]], n
         return ()
     mean, deviation = (jnp.asarray(np.array(side)) for side in zip(*chosen.values(), strict=True))
     size = sum(p.value.size for p in free.chosen if p.path in chosen)
-    return (Priors(tuple(chosen), mean, deviation, size, jnp.asarray(noise)),)
+    return (Priors(tuple(chosen), mean, deviation, size, jnp.asarray(1.0)),)
 
 
 class Round(NamedTuple):

@@ -16,7 +16,7 @@ from jaxdamp.identify.design_candidates import MachineLimits, Point, beyond, ref
 from jaxdamp.identify.model import law_of
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.problem import linearised
-from jaxdamp.identify.traces import Batch
+from jaxdamp.identify.traces import signals
 from jaxdamp.parameters import FreeParameters, get, match_paths
 from jaxdamp.rig import Rig
 
@@ -168,11 +168,7 @@ def information(
     runs = [_motion(test, number, sampling_rate, held) for number, test in enumerate(tests)]
     problem = prepare(law, runs, rig=rig, freeze=freeze, tie=tie)
     residual, jacobian = map(np.asarray, linearised(problem.free, problem.free.values, problem.residuals))
-    batches = [part for part in problem.residuals if isinstance(part, Batch)]
-    weight, measured, velocity = (
-        np.concatenate([np.ravel(getattr(batch, name)) for batch in batches])
-        for name in ("weight", "force", "velocity")
-    )
+    weight, measured, velocity = signals(problem.residuals, "weight", "force", "velocity")
     force = np.divide(residual, weight, out=np.zeros_like(residual), where=weight > 0) + measured
     rows = [np.flatnonzero(problem.used & (problem.owner == i)) for i in range(len(runs))]
     matrices = np.stack([jacobian[k].T @ jacobian[k] for k in rows]) / force_noise**2

@@ -49,12 +49,7 @@ class FirstStates(NamedTuple):
 
 
 def first_states(model: Model, runs: Sequence[BenchRun]) -> FirstStates:
-    """The states at the first sample of each record.
-
-    Arguments:
-        model: a law with states, on a machine or not.
-        runs: the records.
-    """
+    """The states at the first sample of each record, of a law with states."""
     made, ranges = batches(model, runs, [1.0] * len(runs), SAMPLES_PER_CYCLE)
     windows = [rest_window(run) for run in runs]
     targets = [float(np.mean(run.force[:n])) if n else np.nan for run, n in zip(runs, windows, strict=True)]

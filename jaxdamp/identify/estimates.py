@@ -70,13 +70,7 @@ def describe(minima: Sequence[Minimum], starts: int) -> str:
 
 
 def parameter_table(title: str, estimates: Sequence[Estimate], truth: Module | None = None) -> Table:
-    """Fitted values with standard errors, and the true values if they are known.
-
-    Arguments:
-        title: title of the table.
-        estimates: estimates of a fit.
-        truth: the true law (on its rig, if one was fitted), as on a virtual bench; parameters are compared by name.
-    """
+    """Fitted values with standard errors, and the true values by name if the true law (on its rig) is known."""
     columns = [Column("parameter"), Column("unit"), Column("value", spec=".5g"), Column("standard error", spec=".2g")]
     biased = any(e.bias is not None for e in estimates)
     columns += [Column("bias by input noise", spec="+.2g")] * biased

@@ -50,11 +50,6 @@ def estimate(problem: Problem, solution: Solution, noise: Noise) -> Estimates:
     half its RMS. A parameter that ended at zero, the end of its domain, is "not identifiable" if it does not differ
     significantly from zero, and "at a bound" if the minimum is beyond. If a parameter is not identifiable or outside
     the records, or if another minimum is nearly as good, the errors of the other parameters are checked by `profile`.
-
-    Arguments:
-        problem: the problem that was minimised.
-        solution: the ends of the searches.
-        noise: of the weighted residual.
     """
     free, found = problem.free, solution.best
     uncertain, variance = uncertainty(found.jacobian, found.residual, noise), noise.variance
@@ -106,10 +101,6 @@ def undetermined(problem: Problem, found: SearchEnd) -> tuple[str, ...]:
     """The free numbers of the law that the records do not determine: all of them after a search without an end.
 
     As `estimate` judges it, but by the derivatives alone, without following a number to where the error rises.
-
-    Arguments:
-        problem: the problem that was minimised.
-        found: the minimum.
     """
     free, of_law = problem.free, [not name.startswith(("rig.", "records.")) for name in problem.free.names]
     if not found.finite:
@@ -164,10 +155,6 @@ def large_changes(problem: Problem, found: SearchEnd) -> Float[np.ndarray, " fre
 
     A knot may move as far as its nearest neighbour, or the end of the records: where its place is not known better, the
     slopes on both sides of it are equal to within their errors, and a curve without it describes the records as well.
-
-    Arguments:
-        problem: the problem that was minimised.
-        found: the minimum.
     """
     (lower, upper), tiny = problem.free.limits(), np.finfo(float).tiny
     sensitivity = np.linalg.norm(found.jacobian, axis=0) / problem.level  # of the force, relative to its RMS
@@ -195,11 +182,7 @@ def _spans(free: FreeParameters, reach: Reach) -> Float[np.ndarray, " free"]:
 
 
 def in_groups(estimates: Sequence[Estimate]) -> list[str]:
-    """How many numbers are not identifiable, and how many at bounds, vectors and their like named once.
-
-    Arguments:
-        estimates: the fitted numbers with their notes.
-    """
+    """How many numbers are not identifiable, and how many at bounds, vectors and their like named once."""
     kinds = {"not identifiable": "cannot be told from these records", "at a bound": "ended at a bound"}
     lines = []
     for note, words in kinds.items():
@@ -275,11 +258,6 @@ def uncertainty(
     A parameter at an edge of its range thus counts as unknown in the errors of the others; if it were taken as fixed,
     their errors would be too small. A direction with a singular value below `RANK_TOLERANCE` of the largest does not
     change the force: its parameters get an infinite variance instead of a result of rounding errors.
-
-    Arguments:
-        jacobian: derivatives of the weighted residual by the parameters.
-        residual: the weighted residual.
-        noise: of the weighted residual.
     """
     scaled, scale = unit_columns(jacobian)
     singular, directions = determined(scaled)

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from jaxdamp.identify.problem import Problem
-from jaxdamp.identify.traces import Batch
+from jaxdamp.identify.traces import signals
 
 
 SHARE = 0.25  # of the samples of a record, at least
@@ -18,22 +18,13 @@ def first_part(problem: Problem) -> Problem | None:
     """The problem on the first part of each record, or None where that is hardly shorter.
 
     What is left of a record weighs as much as the whole record, so that sums of squares and priors stay comparable.
-
-    Arguments:
-        problem: with records of a bench.
     """
     used, factor = problem.used, np.ones(problem.used.size)
-    stroke, velocity = (_signal(problem, name) for name in ("stroke", "velocity"))
+    stroke, velocity = signals(problem.residuals, "stroke", "velocity")
     for place in problem.places:
         factor[place] = _of_record(used[place], stroke[place], velocity[place])
     count, kept = np.count_nonzero(used), np.count_nonzero(used & (factor > 0))
     return problem.reweighted(factor) if count >= LEAST and kept <= MOST * count else None
-
-
-def _signal(problem: Problem, name: str) -> Float[np.ndarray, " samples"]:
-    """A signal of the records, at the samples of the residuals."""
-    parts = problem.residuals
-    return np.concatenate([np.ravel(getattr(part, name)) if isinstance(part, Batch) else part.used() for part in parts])
 
 
 def _of_record(

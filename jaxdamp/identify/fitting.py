@@ -17,7 +17,7 @@ from jaxdamp._status import Status
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._triangles import triangle
 from jaxdamp.bench import BenchRun, as_runs, usable
-from jaxdamp.identify.contradicting import contradicting, refuse_contradicting
+from jaxdamp.identify.contradicting import refuse_several_laws
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, solve_by
 from jaxdamp.identify.judging import MOST_WARNINGS, input_noise_bias, judge, on_bias
 from jaxdamp.identify.law_result import FitResult
@@ -177,8 +177,7 @@ def fit(
     runs = usable(records, settings["bad_records"], robust=loss != "squares")
     settings = {**settings, "weighting": weighting_of(runs, records, settings["weighting"])}
     problem = prepare(law, runs, rig=rig, **part(settings, PROBLEM))
-    if settings["bad_records"] != "keep" and not settings["per_record"] and settings["initial_state"] != "estimated":
-        refuse_contradicting(contradicting(problem.free.tree, problem.fitted_to))
+    refuse_several_laws(problem.free.tree, problem.fitted_to, settings)
 
     def by_squares(problem: Problem, starts: int | None) -> Solution:
         return solve(problem, starts=starts, max_steps=settings["max_steps"], solver=settings["solver"])

@@ -55,12 +55,8 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
     or more are beyond the velocities of all others, the fit of all is judged on them, since its error there counts
     too. A number that the other parts do not determine keeps its value of the fit of all records.
 
-    Arguments:
-        result: of `fit`.
-        in_time: never leave whole records out, since the fit has numbers that only one record determines.
-
-    Returns:
-        The errors; None where no part can be left out.
+    With `in_time` whole records are never left out, since the fit has numbers that only one record determines. None
+    where no part can be left out.
     """
     evidence = result.evidence
     assert evidence is not None
@@ -109,12 +105,7 @@ def _beyond(result: FitResult, fitted: np.ndarray, unreached: Sequence[np.ndarra
 
 
 def on_records(result: FitResult, runs: Sequence[BenchRun]) -> HeldOut | None:
-    """The errors of a fit on other records, in four parts of each if they are fewer than three.
-
-    Arguments:
-        result: of `fit`.
-        runs: records that were not fitted.
-    """
+    """The errors of a fit on other records, in four parts of each if they are fewer than three."""
     few, parts = len(runs) < FEWEST_MOTIONS, []
     for i, run in enumerate(runs):
         if few:
@@ -133,9 +124,6 @@ def _together(samples: Sequence[Compared], words: str) -> HeldOut | None:
 
 def motions(runs: Sequence[BenchRun]) -> list[list[int]]:
     """The records in groups of the same motion, by frequency and largest velocity, from slow to fast.
-
-    Arguments:
-        runs: the records.
 
     >>> from jaxdamp import bench, dampers
     >>> tests = [bench.SineTest(amplitude=0.01, frequency=f, name=n) for f, n in ((3.0, "a"), (1.0, "b"), (3.0, "c"))]
@@ -157,8 +145,7 @@ def motions(runs: Sequence[BenchRun]) -> list[list[int]]:
 def in_time_parts(run: BenchRun) -> Iterator[Bool[np.ndarray, " samples"]]:
     """The samples of each of four parts of a record: its quarters, or slices in turn where it has few cycles.
 
-    Arguments:
-        run: the record; rest before and after the motion belongs to the nearest part.
+    Rest before and after the motion belongs to the nearest part.
     """
     moving = moving_samples(run)
     count = moving.stop - moving.start

@@ -14,7 +14,7 @@ from jaxdamp.identify.model import STARTS, Model, law_of, rig_of
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.stated import charged_apart, gas_charges
-from jaxdamp.identify.traces import Batch
+from jaxdamp.identify.traces import Batch, signals
 
 
 MOST = 0.95  # part of the squared effect on the force that counts as all of it
@@ -63,11 +63,10 @@ class Effect(NamedTuple):
 
 def effects(problem: Problem, found: SearchEnd) -> list[Effect | None]:
     """Where each free number acts, `None` where it does not; everywhere if the records are not those of a bench."""
-    batches = [part for part in problem.residuals if isinstance(part, Batch)]
-    if len(batches) < len(problem.residuals):
+    if not all(isinstance(part, Batch) for part in problem.residuals):
         return [Effect(1.0, (0.0, 0.0), 0.0)] * found.values.size
     used = problem.used
-    velocity = np.concatenate([np.ravel(batch.velocity) for batch in batches])[used]
+    velocity = signals(problem.residuals, "velocity")[0][used]
     return [_effect(column, velocity) for column in found.jacobian[used].T]
 
 
@@ -87,17 +86,9 @@ def on_identifiability(
     estimates: Sequence[Estimate],
     directions: Sequence[Float[np.ndarray, " free"]],
 ) -> tuple[tuple[Estimate, ...], list[str]]:
-    """The reasons why parameters are not identifiable.
+    """The estimates with the reasons why parameters are not identifiable, and sentences on these.
 
-    Arguments:
-        problem: the problem that was minimised.
-        found: the minimum.
-        estimates: the fitted numbers with their notes.
-        directions: changes of the parameters that hardly change the force (`weak_directions`).
-
-    Returns:
-        The estimates with reasons, and sentences on parameters at bounds, on those that are not identifiable, and on
-        groups of which only a combination is.
+    Also on parameters at bounds, and on groups of which only a combination is identifiable by the `weak_directions`.
     """
     shown, groups = effects(problem, found), _groups(estimates, directions)
     knots = problem.coordinates.ordered
@@ -175,14 +166,7 @@ def gas_in_words(
     estimates: Sequence[Estimate],
     covariance: Float[np.ndarray, "free free"],
 ) -> list[str]:
-    """A sentence on numbers of the gas force that the records hardly tell apart, since they are at one pressure.
-
-    Arguments:
-        model: the fitted law, on its machine if there is one.
-        runs: the fitted records.
-        estimates: of the free numbers.
-        covariance: of the same.
-    """
+    """A sentence on numbers of the gas force that the records hardly tell apart, since they are at one pressure."""
     law, inside = law_of(model), "" if isinstance(model, AbstractDamper) else "law."
     gas = tuple(inside + prefix for prefix, _ in gas_charges(law))
     if not gas or charged_apart(law, runs):

@@ -142,10 +142,7 @@ def fields_of_fit(problem: Problem, solution: Solution, noise: Noise, estimates:
 def on_status(best: SearchEnd, unsettled: Sequence[str], remedy: str = "") -> list[str]:
     """A sentence on a search that did not converge.
 
-    Arguments:
-        best: where it ended.
-        unsettled: numbers that are not where the derivatives place the minimum, though the search found no better step.
-        remedy: what helps after too few steps.
+    `unsettled` are numbers that are not where the derivatives place the minimum, though no better step was found.
     """
     if best.converged and not unsettled:
         return []
@@ -272,12 +269,9 @@ def _driving(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
 
 
 def input_noise_bias(problem: Problem, best: SearchEnd, input_noise: tuple[float, float]) -> Float[np.ndarray, " free"]:
-    """Estimated bias of each free number, in its unit.
+    """Estimated bias of each free number, in its unit, by independent noise of the records.
 
-    Arguments:
-        problem: a problem on bench records that was minimised.
-        best: its minimum.
-        input_noise: standard deviations of the stroke [m] and the velocity [m/s] of the records, as independent noise.
+    The noise has standard deviations of the stroke [m] and the velocity [m/s].
     """
     if np.shape(input_noise) != (2,):
         must = "be the standard deviations of stroke [m] and velocity [m/s]"
@@ -302,15 +296,12 @@ def input_noise_bias(problem: Problem, best: SearchEnd, input_noise: tuple[float
 
 def _perturbed(problem: Problem, noise: Sequence[np.ndarray]) -> tuple[AbstractResiduals, ...]:
     """The residuals with noise added to stroke and velocity."""
-    parts, begin = [], 0
-    for part in problem.residuals:
-        size = part.used().size
+    parts = []
+    for (part, stroke), (_, velocity) in zip(*map(problem.by_part, noise), strict=True):
         if isinstance(part, Batch):
-            x, v = (values[begin : begin + size].reshape(part.stroke.shape) for values in noise)
-            moved = (part.stroke + jnp.asarray(x), part.velocity + jnp.asarray(v))
-            part = eqx.tree_at(lambda b: (b.stroke, b.velocity), part, moved)
+            x, v = (jnp.asarray(values.reshape(part.stroke.shape)) for values in (stroke, velocity))
+            part = dataclasses.replace(part, stroke=part.stroke + x, velocity=part.velocity + v)
         parts.append(part)
-        begin += size
     return tuple(parts)
 
 

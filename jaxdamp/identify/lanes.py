@@ -17,7 +17,7 @@ from jaxdamp.identify.noise import CORRELATED, correlation_time
 from jaxdamp.identify.predicting import fit_percent, score
 from jaxdamp.identify.problem import ROUNDING, Problem
 from jaxdamp.identify.search import Here, Searches, searches_of
-from jaxdamp.identify.traces import Batch
+from jaxdamp.identify.traces import Batch, signals
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.solve import Linearisation, SearchLanes
 
@@ -63,11 +63,6 @@ class Lanes(NamedTuple):
         """Variance of the weighted residual in each record of a damper, larger where it is correlated unless known.
 
         It is one for all records, or one for each if the problem weights them so or it is known.
-
-        Arguments:
-            damper: its number.
-            residual: weighted.
-            free: count of free numbers.
         """
         problem, parts = self.problems[damper], self.of_records(damper, residual)
         if self.force_noise is not None:
@@ -150,16 +145,15 @@ def judged(lanes: Lanes, end: SearchLanes, depends: Dependence | None) -> dict[s
     for i, problem in enumerate(lanes.problems):
         here = lanes.searches[i].here(end.y[i])
         values[i] = here.values
-        batches = [part for part in problem.residuals if isinstance(part, Batch)]
         variances = lanes.variances(i, here.whole[:, -1], free if depends is None else depends.size / count)
         variances /= problem.level**2
         whole = lanes.searches[i].products(here)[:-1, :-1]
         noise.append(_Noise(here.units, whole, float(variances.min()), lanes.excess(i, here, variances)))
-        periodic = [batch for batch in batches if batch.cycle is not None]
+        periodic = [part for part in problem.residuals if isinstance(part, Batch) and part.cycle is not None]
         drift[i] = max(
             [float(_drift(problem.free, jnp.asarray(here.values), batch)) for batch in periodic], default=0.0
         )
-        percent[i], rmse[i], each = _errors(lanes, i, batches, here, settled=bool(drift[i] <= DRIFT))
+        percent[i], rmse[i], each = _errors(lanes, i, here, settled=bool(drift[i] <= DRIFT))
         by_record.append(each)
     errors_of_numbers = _standard_errors(end, noise, depends)
     named = {"values": values, "standard_errors": errors_of_numbers, "fit_percent": percent, "rmse": rmse}
@@ -167,7 +161,7 @@ def judged(lanes: Lanes, end: SearchLanes, depends: Dependence | None) -> dict[s
 
 
 def _errors(
-    lanes: Lanes, damper: int, batches: Sequence[Batch], here: Here, *, settled: bool
+    lanes: Lanes, damper: int, here: Here, *, settled: bool
 ) -> tuple[float, float, Float[np.ndarray, " records"]]:
     """Fit percent and RMSE [N] of a damper, and the RMSE [N] of each record, over all samples.
 
@@ -181,8 +175,8 @@ def _errors(
             problem.free.build(jnp.asarray(here.values)), problem.runs, None, problem.initial_state
         )
         return percent, rmse, np.array([of_record.rmse for of_record in scores])
-    signals = (np.concatenate([np.ravel(getattr(b, name)) for b in batches]) for name in ("weight", "force"))
-    missed, weight, force = (lanes.of_records(damper, signal) for signal in (here.whole[:, -1], *signals))
+    columns = here.whole[:, -1], *signals(problem.residuals, "weight", "force")
+    missed, weight, force = (lanes.of_records(damper, column) for column in columns)
     errors = [part / root for part, root in zip(missed, weight, strict=True)]
     percent = fit_percent(force, [measured - error for measured, error in zip(force, errors, strict=True)])
     each = np.array([np.mean(np.square(error)) for error in errors])
@@ -211,13 +205,7 @@ class _Noise(NamedTuple):
 def _standard_errors(
     end: SearchLanes, noise: Sequence[_Noise], depends: Dependence | None
 ) -> Float[np.ndarray, "dampers free"]:
-    """Standard errors of the numbers of each damper: (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹ with the variance Σ of each record.
-
-    Arguments:
-        end: of each damper.
-        noise: of each damper.
-        depends: how dampers depend on shared numbers.
-    """
+    """Standard errors of the numbers of each damper: (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹ with the variance Σ of each record."""
     count, free = end.y.shape
     if depends is None:
         each = [_covariance(end.aux[i], one.least, one.excess) for i, one in enumerate(noise)]
@@ -242,20 +230,14 @@ def _covariance(
 ) -> tuple[Float[np.ndarray, "free free"], Bool[np.ndarray, " free"]]:
     """The covariance of coordinates, and which take part in directions that change no force.
 
-    Arguments:
-        products: of the columns of the Jacobian and the residual.
-        least: variance that every sample has.
-        beyond: the products, weighted by the variances beyond it.
+    By the products of the columns of the Jacobian and the residual, the variance that every sample has, and the
+    products weighted by the variances beyond it.
     """
-    inverse, lost = _inverse(products[:-1, :-1])
-    return least * inverse + inverse @ beyond @ inverse, lost
-
-
-def _inverse(products: Float[np.ndarray, "free free"]) -> tuple[np.ndarray, np.ndarray]:
-    """(JᵀJ)⁻¹ without the directions that change no force, and the numbers that take part in those."""
+    products = products[:-1, :-1]
     norms = np.sqrt(np.diag(products))
     scale = np.where(norms > 0, norms, 1.0)
     squares, directions = np.linalg.eigh(products / np.outer(scale, scale))
     seen = squares > BLIND * squares[-1]
-    inverse = (directions[:, seen] / squares[seen]) @ directions[:, seen].T
-    return inverse / np.outer(scale, scale), np.sum(directions[:, seen] ** 2, axis=1) < 1.0 - 1e-3
+    inverse = (directions[:, seen] / squares[seen]) @ directions[:, seen].T / np.outer(scale, scale)
+    lost = np.sum(directions[:, seen] ** 2, axis=1) < 1.0 - 1e-3
+    return least * inverse + inverse @ beyond @ inverse, lost

@@ -75,10 +75,6 @@ def left_out(problem: Problem, best: SearchEnd) -> list[str]:
 
     Offset, gas spring, mass, friction, delay, low-pass filter, heat, zero that drifts, gain of a record, clearance;
     curve and memory of the damper; the mains, a clock that jitters.
-
-    Arguments:
-        problem: a problem on bench records that was minimised.
-        best: its minimum.
     """
     used = problem.used
     if problem.is_rounding(best.squares) or np.count_nonzero(used) <= 2 * best.values.size:
@@ -134,12 +130,7 @@ def _of_the_law(named: Sequence[_Named], left: float, memoryless: bool) -> str:
 
 
 def span_free(span: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Values without what an orthonormal basis has of them.
-
-    Arguments:
-        span: the basis, in columns.
-        values: one column or several.
-    """
+    """Values, in one column or several, without what an orthonormal basis, in columns, has of them."""
     return values - span @ (span.T @ values)
 
 

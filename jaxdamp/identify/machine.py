@@ -85,11 +85,7 @@ def machine_names(argument: str, names: str | Sequence[str]) -> list[str]:
 
 
 def started_machine(rig: Machine, runs: Sequence[BenchRun]) -> Rig | None:
-    """The machine with the starts of its free numbers; names get starts from the records.
-
-    Raises:
-        ValueError: an unknown name; a machine that adds nothing.
-    """
+    """The machine with the starts of its free numbers; names get starts from the records."""
     if rig is None:
         return None
     if not isinstance(rig, Rig) and (isinstance(rig, str) or all(isinstance(name, str) for name in rig)):
@@ -117,12 +113,7 @@ def without_command_lag(rig: Machine) -> tuple[Machine, float]:
 
 
 def refuse_lag_of_held(asked: bool, runs: Sequence[BenchRun]) -> None:
-    """Refuse a lag of the actuator where no record has a command that varies.
-
-    Arguments:
-        asked: whether the lag was asked for.
-        runs: the records.
-    """
+    """Refuse a lag of the actuator where no record has a command that varies."""
     if asked and all(run.command_channel is None for run in runs):
         remedy = "Record the command as a channel, `BenchRun.command_channel`, or leave the lag out."
         _checks.refuse("rig", "have no `command_lag` beside commands that are held", "one with it", remedy)
@@ -145,11 +136,7 @@ def started_on(law: Start, runs: Sequence[BenchRun], rig: Machine, named: Iterab
     meaning of its own, such as the gas charge of a `MonoTube`, which is the points of a table together, or which the
     call gives a value or a name; but it stays where records state several charges, which tell the two apart.
 
-    Arguments:
-        law: the start.
-        runs: the records.
-        rig: the machine.
-        named: names and patterns of parameters to which the call gives bounds, priors, partners or values by record.
+    `named` are the parameters to which the call gives bounds, priors, partners or values by record.
     """
     machine = started_machine(rig, runs)
     bare, trained = without_machine(machine, runs), isinstance(law, AbstractTrainedStart)
@@ -172,11 +159,7 @@ def started_on(law: Start, runs: Sequence[BenchRun], rig: Machine, named: Iterab
 
 
 def constant_forces(law: AbstractDamper) -> list[str] | None:
-    """Paths of the single numbers that only add a constant to the force; None if its static force is more than these.
-
-    Arguments:
-        law: the damper law.
-    """
+    """Paths of the single numbers that only add a constant to the force; None if its static force is more than that."""
     paths = []
     for prefix, part in laws_inside(law):
         if part.inner_laws() or not part.traits().contains_offset:

@@ -17,6 +17,7 @@ from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun
 from jaxdamp.blocks import Cluster
 from jaxdamp.dampers import AbstractDamper, Reach
+from jaxdamp.identify.contradicting import refuse_several_laws
 from jaxdamp.identify.criteria import LOSSES, Priors
 from jaxdamp.identify.dependence import OWN, Dependence, Products, dependence
 from jaxdamp.identify.initial_states import INITIAL_STATES
@@ -31,7 +32,6 @@ from jaxdamp.identify.many_records import (
     by_name,
     fitted_records,
     left_out_in_words,
-    refuse_several_laws,
 )
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.model import initial_state_for, own_names, rig_of
@@ -123,7 +123,7 @@ def fit_many(
     some = list(records.values())[:: -(-len(records) // STARTED_FROM)]
     begin = begun_on(law, [run for runs in some for run in runs], how, shared)
     for name, runs in records.items():
-        refuse_several_laws(name, runs, begin.model, how)
+        refuse_several_laws(begin.model, runs, how, f"dampers[{name!r}]")
     lacking = [[run.name for run in runs if run not in records[name]] for name, runs in given.items()]
     many = fitted_together(begin, records, how, shared, stated)
     return dataclasses.replace(many, reasons=tuple(map(left_out_in_words, lacking)))
@@ -137,15 +137,7 @@ def fitted_together(
     shared: Mapping[str, int] | Sequence[str] = (),
     settings: tuple[float, ...] | None = None,
 ) -> ManyFits:
-    """The fits of dampers from a start that is resolved.
-
-    Arguments:
-        begin: of all dampers.
-        dampers: the records that the fits take, by name.
-        options: of `fit_many`.
-        shared: as in `fit_many`.
-        settings: of the dampers.
-    """
+    """The fits of dampers from a start that is resolved."""
     free, records = begin.free, tuple(dampers.values())
     degrees = shared if isinstance(shared, Mapping) else dict.fromkeys(name_patterns("shared", shared), 0)
     depends = dependence(free, own_names(begin.model).find_keys("shared", degrees), settings, len(dampers))

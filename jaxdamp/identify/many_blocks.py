@@ -19,13 +19,13 @@ from jaxdamp._status import Status
 from jaxdamp._warned import warn
 from jaxdamp.bench import BenchRun, DamperRecords
 from jaxdamp.blocks import AbstractWork, Blocks, BlockStore, Cluster, Variable, fill, stored_blocks
+from jaxdamp.identify.contradicting import refuse_several_laws
 from jaxdamp.identify.many_records import (
     AllRecords,
     Options,
     begun_on,
     fitted_records,
     left_out_in_words,
-    refuse_several_laws,
 )
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.preparing import Beginning
@@ -46,14 +46,9 @@ NUMBERS = ("fit_percent", "rmse", "drift", "share_left_out")  # of each damper, 
 
 @final
 class DamperFits(AbstractWork):
-    """Fits of the dampers in the rows of a store.
+    """Fits of the dampers in the rows of a store, from a beginning with a first record; rows without a name stay empty.
 
-    Arguments:
-        beginning: of all fits.
-        options: of `fit_many`.
-        first: a record that they begin with.
-        records: of the dampers by name.
-        names: of the dampers by row, empty for those of other calls; rows without one stay empty.
+    The name of a damper of another call is empty.
     """
 
     def __init__(
@@ -104,7 +99,7 @@ class DamperFits(AbstractWork):
         """The records of a damper that its fit takes, and the names of those that are left out."""
         records = self._records[name]
         runs, model = fitted_records(name, records, self._options), self._beginning.model
-        refuse_several_laws(name, runs, model, self._options)
+        refuse_several_laws(model, runs, self._options, f"dampers[{name!r}]")
         for stated in (stated_values, followed_channels):  # what only some dampers state is refused as in memory
             stated(model, (self._first, *runs))
         return runs, [run.name for run in records if run not in runs]
@@ -150,18 +145,7 @@ def fit_into_store(
     shared: bool,
     options: Options,
 ) -> ManyFits:
-    """Fit the dampers that a store lacks, and give the fits of all dampers of the call.
-
-    Arguments:
-        law: the start as it was given.
-        records: of the dampers.
-        settings: of the dampers.
-        path: of the store.
-        cluster: as in `jaxdamp.sweep`.
-        progress: as in `fit_many`.
-        shared: whether parameters are.
-        options: of the call besides.
-    """
+    """Fit the dampers that a store lacks, and give the fits of all dampers of the call."""
     place = _checked_path(path, len(records), settings, shared)
     name, runs = _first_readable(records, options)
     beginning = begun_on(law, runs, options)
@@ -305,11 +289,6 @@ def _identity(beginning: Beginning, runs: Sequence[BenchRun], options: Options) 
 
     Numbers that come from the records of the first damper are left out, except of a law class: another damper may be
     the first later. They are those that records state, and where the search of a machine begins that effects name.
-
-    Arguments:
-        beginning: of all fits.
-        runs: the records that it comes from.
-        options: of the call.
     """
     free, named = beginning.free, not isinstance(options["rig"], Rig)
     from_records = np.array([named and p.path.startswith("rig.") for p in free.owners], bool)

@@ -8,9 +8,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._settings import part
 from jaxdamp.bench import BenchRun, DamperRecords, as_runs, usable
-from jaxdamp.identify.contradicting import contradicting, refuse_contradicting
 from jaxdamp.identify.machine import Machine
-from jaxdamp.identify.model import Model
 from jaxdamp.identify.preparing import Beginning, begun
 from jaxdamp.identify.settings import FREE, PROBLEM, FitSettings, ProblemSettings
 from jaxdamp.identify.starting import Start
@@ -46,16 +44,7 @@ def by_name(dampers: object) -> AllRecords:
 
 
 def fitted_records(name: str, runs: tuple[BenchRun, ...], options: Options) -> tuple[BenchRun, ...]:
-    """The records of a damper that its fit takes.
-
-    Arguments:
-        name: of the damper.
-        runs: its records.
-        options: of `fit_many`.
-
-    Raises:
-        ValueError: a record with an error, or a force that does not vary.
-    """
+    """The records of a damper that its fit takes; one with an error, or forces that do not vary, are refused."""
     argument = f"dampers[{name!r}]"
     if not any(np.ptp(run.force) > 0 for run in runs):
         _checks.refuse(argument, "hold records with a force that varies", f"{len(runs)} without")
@@ -63,28 +52,11 @@ def fitted_records(name: str, runs: tuple[BenchRun, ...], options: Options) -> t
 
 
 def left_out_in_words(names: Sequence[str]) -> str:
-    """What is said of a damper some of whose records were left out because of an error; empty if none were.
-
-    Arguments:
-        names: of these records.
-    """
+    """What is said of a damper some of whose records were left out because of an error; empty if none were."""
     return f"it was fitted without {', '.join(map(repr, names))}: records with an error" if names else ""
 
 
-def refuse_several_laws(name: str, runs: tuple[BenchRun, ...], model: Model, options: Options) -> None:
-    """Refuse records of one damper that no one law can follow, unless they are to be kept or have own numbers."""
-    if options["bad_records"] != "keep" and not options["per_record"] and options["initial_state"] != "estimated":
-        refuse_contradicting(contradicting(model, runs), f"dampers[{name!r}]")
-
-
 def begun_on(law: Start, runs: Sequence[BenchRun], options: Options, shared: Iterable[str] = ()) -> Beginning:
-    """The start that some records give.
-
-    Arguments:
-        law: the start as it was given.
-        runs: the records.
-        options: of `fit_many`.
-        shared: names of parameters that are shared.
-    """
+    """The start that some records give."""
     how: ProblemSettings = {**PROBLEM, **part(options, FREE)}
     return begun(law, runs, [1.0] * len(runs), options["rig"], how, mentioned=shared)

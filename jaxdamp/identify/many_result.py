@@ -271,16 +271,15 @@ class ManyFits(AbstractResult):
         """The fits as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         names = list(self.parameters)
         units = dict(zip(names, (owner.unit for owner in self.free.owners), strict=True))
+        arrays = {"values": self.values, "standard_errors": self.standard_errors, "bias": self.bias}
         dampers = {
             name: {
                 **({} if self.settings is None else {"setting": self.settings[i]}),
-                "values": plain(dict(zip(names, self.values[i].tolist(), strict=True))),
-                "standard_errors": plain(dict(zip(names, self.standard_errors[i].tolist(), strict=True))),
-                **(
-                    {"bias": plain(dict(zip(names, self.bias[i].tolist(), strict=True)))}
-                    if self.bias is not None
-                    else {}
-                ),
+                **{
+                    kind: plain(dict(zip(names, array[i].tolist(), strict=True)))
+                    for kind, array in arrays.items()
+                    if array is not None
+                },
                 "fit": with_unit(float(self.fit_percent[i]), "%"),
                 "rmse": with_unit(float(self.rmse[i]), "N"),
                 "status": self.status[i].name.lower(),

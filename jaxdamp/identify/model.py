@@ -33,6 +33,7 @@ from jaxdamp.vehicles import AbstractVehicle
 
 
 Given = TypeVar("Given")
+Tree = TypeVar("Tree")
 STARTS = "records."  # with which the paths of the states at the beginning of records begin
 
 
@@ -119,23 +120,13 @@ class OwnNames(NamedTuple):
 
         Without it the last part of another path would count too: "stiffness" is that of a `SeriesSpring` alone.
 
-        Arguments:
-            argument: that the names were given for, in messages.
-            names: names and patterns.
-
-        Raises:
-            ValueError: a name or pattern that is one thing for the law alone and another beside the machine, such as
-                "law.lag_time" of `Lag(Lag(law))`.
+        A name that is one thing for the law alone and another beside the machine is refused, such as "law.lag_time" of
+        `Lag(Lag(law))`.
         """
         return [self._one(argument, name) for name in name_patterns(argument, names)]
 
     def find_keys(self, argument: str, given: Mapping[str, Given] | None) -> Mapping[str, Given]:
-        """A mapping by name with the names that `find` returns, also as values (ties); empty for none.
-
-        Arguments:
-            argument: as in `find`.
-            given: values by names and patterns.
-        """
+        """A mapping by name with the names that `find` returns, also as values (ties); empty for none."""
         if not given:
             return {}
         if not isinstance(given, Mapping):
@@ -163,11 +154,7 @@ class OwnNames(NamedTuple):
 
 
 def own_names(model: Model | VehicleTest) -> OwnNames:
-    """How names of the law or the vehicle of a model are found in it.
-
-    Arguments:
-        model: a law, alone or on a machine, or a vehicle with its sensors.
-    """
+    """How names of the law or the vehicle of a model are found in it."""
     part = fitted_part(model)
     alone, beside = ([] if part is model else [p.path for p in parameters(tree)] for tree in (part, model))
     return OwnNames(alone, beside, "vehicle." if isinstance(model, VehicleTest) else "law.")
@@ -253,9 +240,14 @@ def with_range(model: Model, fitted_to: FittedRange) -> Model:
     return on_rig(with_fitted_range(without_standard_errors(law_of(model)), fitted_to), rig_of(model), starts_in(model))
 
 
-def with_means(model: Model, paths: Sequence[str]) -> Model:
+def with_means(model: Tree, paths: Sequence[str]) -> Tree:
     """The model with the mean over the records at paths where it has a value for each."""
     return with_values(model, {path: jnp.mean(get(model, path)) for path in paths})
+
+
+def spread(model: Tree, paths: Sequence[str], records: int) -> Tree:
+    """The model with a vector of values, one for each record, at some paths."""
+    return with_values(model, {path: jnp.full(records, get(model, path)) for path in paths})
 
 
 def blind_end(model: Model, dt: float) -> int:
@@ -313,11 +305,7 @@ def initial_state(model: Model, effects: tuple[str, ...], cycle: Cycle, followed
 
 
 def joined_range(ranges: Sequence[FittedRange]) -> FittedRange:
-    """The lowest and highest of several ranges.
-
-    Arguments:
-        ranges: of the records of several dampers.
-    """
+    """The lowest and highest of several ranges."""
     names = {q.name for each in ranges for q in each.known()}
     limits = {name: [q.limits for each in ranges for q in each.known() if q.name == name] for name in names}
     return FittedRange(
@@ -328,9 +316,7 @@ def joined_range(ranges: Sequence[FittedRange]) -> FittedRange:
 def covered_range(runs: Sequence[BenchRun], *, warms: bool = False) -> FittedRange:
     """Lowest and highest value of each channel over all records, and of temperature and command if stated.
 
-    Arguments:
-        runs: the records that were fitted, one or more.
-        warms: whether the law depends on the temperature, so that the one at the start of the records counts too.
+    If the law depends on the temperature (`warms`), the one at the start of the records counts too.
 
     >>> from jaxdamp import bench, dampers
     >>> runs = bench.VirtualDyno(dampers.Linear(1500.0)).run([bench.SineTest(0.01, f) for f in (1.0, 3.0)])

@@ -65,13 +65,7 @@ class Noise(NamedTuple):
 
 
 def independent(sigma: Float[np.ndarray, " samples"], used: Bool[np.ndarray, " samples"], free: int) -> Noise:
-    """White noise of these standard deviations.
-
-    Arguments:
-        sigma: of each sample.
-        used: which samples count.
-        free: number of fitted parameters.
-    """
+    """White noise of these standard deviations."""
     rows = np.flatnonzero(used)
     return Noise(sigma, (rows,), (np.ones(1),), 1.0, float(max(rows.size - free, 1))).with_sigma(sigma)
 
@@ -94,11 +88,6 @@ def _noise_of_records(problem: Problem, found: SearchEnd, force_noise: float | N
     - Else each record has its own level and autocorrelation. The fit removes some of the noise from the residual: with
       the projection P on the derivatives, the sum of squares has the mean tr Σ − tr PΣ, by which Σ is corrected, and
       Student's t has (tr Σ − tr PΣ) tr Σ / tr Σ² degrees of freedom (Satterthwaite), N − p for white noise.
-
-    Arguments:
-        problem: the problem that was minimised.
-        found: the minimum.
-        force_noise: standard deviation of the measured force [N], if it is known, as white noise.
     """
     owner, used, sigma = problem.owner, problem.used, np.array(problem.sigma)
     records = tuple(np.flatnonzero(used & (owner == i)) for i in range(sigma.size))
@@ -121,13 +110,7 @@ def _noise_of_records(problem: Problem, found: SearchEnd, force_noise: float | N
 
 
 def channel_noise(problem: Problem, residual: Float[np.ndarray, " samples"], free: int) -> Noise:
-    """The noise of a vehicle's records: a level for each channel, inflated where over `CORRELATED` samples are alike.
-
-    Arguments:
-        problem: the problem that was solved.
-        residual: the weighted residual.
-        free: count of free numbers, for the degrees of freedom.
-    """
+    """The noise of a vehicle: a level for each channel, inflated where over `CORRELATED` samples are alike."""
     used, owner = problem.used, problem.owner
     parts = {int(i): residual[used & (owner == i)] for i in np.unique(owner[used])}
     counted = correlation_time(list(parts.values()))
@@ -241,12 +224,7 @@ def correlation_time(residuals: Sequence[Float[np.ndarray, " _"]]) -> float:
 
 
 def repeats(problem: Problem, residuals: Sequence[Float[np.ndarray, " _"]]) -> bool:
-    """Whether the residual returns from cycle to cycle; yes if no record is long enough to tell.
-
-    Arguments:
-        problem: the problem that was minimised.
-        residuals: the used samples of each record.
-    """
+    """Whether the residual returns from cycle to cycle; yes if no record is long enough to tell."""
     alike, size = 0.0, 0.0
     for run, step, residual in zip(problem.runs, problem.sample_steps, residuals, strict=True):
         cycle = round(1.0 / (step * run.frequency)) if run.frequency > 0 else residual.size
@@ -264,10 +242,6 @@ def spread_over_parts(problem: Problem, found: SearchEnd) -> list[float]:
     all cycles together since what a law misses returns in each, and the records where there are three or more; the
     larger error counts. It says how much the numbers depend on which motion was measured, not how far the law is from
     the damper.
-
-    Arguments:
-        problem: the problem that was minimised.
-        found: the minimum.
     """
     scaled, scale = unit_columns(found.jacobian)
     part, record = np.full(problem.owner.size, -1), np.where(problem.used, problem.owner, -1)

@@ -169,13 +169,9 @@ def compared(
 ) -> list[Compared]:
     """The samples that a model, or one for each record, is compared over: those that count, of records or their parts.
 
-    Arguments:
-        model: a law, or a law on a test machine.
-        runs: the records.
-        initial_state: how they start, as in `fit`.
-        parts: the number of the record, the name and the samples of each part; those without a sample that counts are
-            left out. None for all records.
-        told: samples at the beginning of each record that told something of the model, which are not compared.
+    `parts` are the number of the record, the name and the samples of each part, None for all records; those without a
+    sample that counts are left out. `told` samples at the beginning of each record told something of the model, and are
+    not compared.
     """
     models, forces = predict_by_record(model, runs, initial_state)
     distinct = {id(each): each for each in models}.values()  # most often one model for all records

@@ -29,6 +29,7 @@ from jaxdamp.identify.model import (
     on_rig,
     own_names,
     rig_of,
+    spread,
     with_means,
 )
 from jaxdamp.identify.problem import Problem
@@ -36,7 +37,7 @@ from jaxdamp.identify.settings import PROBLEM, ProblemSettings
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.identify.stated import stated_parameters, stated_values, with_stated
 from jaxdamp.identify.traces import batches_of_each, owners, places
-from jaxdamp.parameters import FreeParameters, free_parameters, match_paths, name_patterns, parameters, with_values
+from jaxdamp.parameters import FreeParameters, free_parameters, match_paths, name_patterns, parameters
 
 
 FIT_OUTSIDE = "Call it outside `jax.jit`, `jax.grad` and `jax.vmap`; the residuals of a `Problem` can be traced."
@@ -143,9 +144,9 @@ def begun(
     frozen += not_chosen(model, asked["over"], "rig.", STARTS)
     frozen += [p.path for p in parameters(model) if p.path in stated]
     limits, tied = names.find_keys("bounds", bounds), names.find_keys("tie", tie)
-    free = free_parameters(_spread(model, own, len(runs)), freeze=frozen, bounds=limits, tie=tied)
+    free = free_parameters(spread(model, own, len(runs)), freeze=frozen, bounds=limits, tie=tied)
     _checks.finite("law", free.values)
-    known = priors_on(free, names.find_keys("priors", priors) or {}, 1.0)
+    known = priors_on(free, names.find_keys("priors", priors))
     return Beginning(begin, model, free, own, initial_state, (*known, *expected))
 
 
@@ -223,12 +224,6 @@ def _per_record(
         remedy = "The value of a record that is not fitted is undetermined: leave this record out of `runs`."
         _checks.refuse("weighting", "be finite with `per_record`", "infinite for some records", remedy)
     return tuple(paths)
-
-
-def _spread(model: Model, paths: Sequence[str], records: int) -> Model:
-    """The model with a vector of values, one for each record, at some paths."""
-    values = {p.path: p.value for p in parameters(model)}
-    return with_values(model, {path: jnp.full(records, values[path]) for path in paths})
 
 
 def weights(weighting: str | Sequence[float] | np.ndarray, runs: Sequence[BenchRun]) -> list[float]:

@@ -210,14 +210,7 @@ def rows_beside(free: FreeParameters, residuals: Sequence[AbstractResiduals]) ->
 def _with_numbers(
     residuals: Sequence[AbstractResiduals], model: Model, taken: PyTree, common: tuple[LawNumbers, LawNumbers]
 ) -> list[tuple[PrintedRecord, LawNumbers, LawNumbers]]:
-    """The records with the numbers of their laws, and with the number of the free value that each takes.
-
-    Arguments:
-        residuals: the records.
-        model: the law.
-        taken: of the law.
-        common: both, of records without values of their own.
-    """
+    """The records with the numbers of their laws, and with the number of the free value that each takes."""
     records = []
     for batch in residuals:
         if not isinstance(batch, Batch):

@@ -2,8 +2,8 @@
 
 import dataclasses
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
 import jax
@@ -20,6 +20,7 @@ from jaxdamp.solve import BoundedLevenbergMarquardt, ImplicitWithinBounds
 
 
 ROUNDING = 1e-8  # residual, relative to the force, below which there is nothing left to explain
+W = TypeVar("W", bound="AbstractWeighted")  # not `Self`, which run-time type checks refuse
 SENSORS = "sensors."  # with which the paths of numbers begin that act on channels after a simulation
 
 
@@ -57,9 +58,20 @@ class AbstractResiduals(eqx.Module):
         """Derivatives by the free numbers and, last, the residual where these are zero; None where not linear."""
         del free
 
-    @abstractmethod
-    def total_weight(self) -> Float[Array, ""]:
-        """Sum of the squared weights, the number of samples as measured where all weigh the same."""
+
+class AbstractWeighted(AbstractResiduals):
+    """Channels of records, of which samples without weight do not count."""
+
+    weight: eqx.AbstractVar[Float[Array, "..."]]
+
+    def reweighted(self: W, factor: Float[np.ndarray, " samples"]) -> W:
+        """The same with every weight times a factor."""
+        weight = np.asarray(self.weight)
+        return dataclasses.replace(self, weight=jnp.asarray(weight * factor.reshape(weight.shape), float))
+
+    def used(self) -> Bool[np.ndarray, " samples"]:
+        """Which samples count."""
+        return np.ravel(self.weight) > 0
 
 
 class Problem(NamedTuple):
@@ -217,10 +229,14 @@ class Problem(NamedTuple):
 
     def reweighted(self, factor: Float[np.ndarray, " samples"]) -> "Problem":
         """The same with the weight of every sample times a factor; the compiled programs are the same."""
-        sizes = [part.used().size for part in self.residuals]
-        factors = np.split(factor, np.cumsum(sizes)[:-1])
-        parts = (part.reweighted(own) for part, own in zip(self.residuals, factors, strict=True))
-        return self._replace(residuals=tuple(parts))
+        return self._replace(residuals=tuple(part.reweighted(own) for part, own in self.by_part(factor)))
+
+    def by_part(
+        self, values: Float[np.ndarray, " samples"]
+    ) -> Iterator[tuple[AbstractResiduals, Float[np.ndarray, " part"]]]:
+        """Each part of the residuals with its own of values at all samples, which may be changed in their place."""
+        ends = np.cumsum([part.used().size for part in self.residuals])
+        return zip(self.residuals, np.split(values, ends[:-1]), strict=True)
 
     def anchor_rows(self, values: Float[np.ndarray, " free"]) -> Float[np.ndarray, "rows columns"]:
         """The Jacobian with the residual as last column of the numbers that have an anchor, none if there is none."""

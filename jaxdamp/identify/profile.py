@@ -64,13 +64,13 @@ def profile(
     most = found.squares + CHI_SQUARE * variance  # the largest sum of squares of a parameter that still fits
     level = float(np.sqrt(variance * found.residual.size / most))  # of a sample's noise, to which tolerances relate
     solver = BoundedLevenbergMarquardt(tolerance=LOOSE * level, patience=PATIENCE)
-    searches = Searches(problem)
+    searches = Searches(problem, solver)
     sides = [(int(i), side) for i in np.flatnonzero(chosen & (errors > 0)) for side in (-1.0, 1.0)]
     for i, side in sides:
         distance, end = np.sqrt(CHI_SQUARE) * errors[i], found
         farthest = max(far[i], distance)
         while distance <= farthest and left > 0:
-            moved = moved_to(searches, end, i, found.values[i] + side * distance, STEPS, solver)
+            moved = moved_to(searches, end, i, found.values[i] + side * distance, STEPS)
             if moved is None:
                 break
             end = moved
@@ -84,9 +84,7 @@ def profile(
     return Profile(wide, open_ended)
 
 
-def moved_to(
-    searches: Searches, end: SearchEnd, index: int, value: float, steps: int, solver: BoundedLevenbergMarquardt
-) -> SearchEnd | None:
+def moved_to(searches: Searches, end: SearchEnd, index: int, value: float, steps: int) -> SearchEnd | None:
     """The end of a search from that of another one, with one value changed; `None` if the law refuses this value."""
     problem, values = searches.problem, end.values.copy()
     values[index] = value
@@ -98,7 +96,7 @@ def moved_to(
         if within is None:
             return None
         values = within
-    return searches.end(values, steps, held=index, solver=solver)
+    return searches.end(values, steps, held=index)
 
 
 def _within_conditions(
@@ -188,7 +186,7 @@ class _Side:
 
     def __init__(self, evidence: Evidence, index: int, unit: float) -> None:
         self.evidence, self.index, self.unit = evidence, index, unit
-        self.searches = Searches(evidence.problem)
+        self.searches = Searches(evidence.problem, COARSE)
         self.centre = float(evidence.minimum.values[index])
         jacobian = evidence.minimum.jacobian
         others = np.delete(jacobian, index, axis=1)
@@ -200,7 +198,7 @@ class _Side:
 
     def at(self, value: float, start: SearchEnd) -> tuple[float, SearchEnd] | None:
         """Cost at a value, and the end of the search; `None` where the law refuses the value."""
-        end = moved_to(self.searches, start, self.index, value, CURVE_STEPS, COARSE)
+        end = moved_to(self.searches, start, self.index, value, CURVE_STEPS)
         if end is None:
             return None
         return max(end.squares - self.evidence.minimum.squares, 0.0) / self.one, end

@@ -88,10 +88,6 @@ def not_worse(errors: Mapping[str, Sequence[float]], best: str) -> list[str]:
     more than its standard error, every record or part of a record being one observation (the rule of one standard
     error). Fewer than three cannot show this: then only `ALIKE` counts.
 
-    Arguments:
-        errors: RMSE [N] on each record or part of a record by law.
-        best: one of these laws.
-
     >>> not_worse({"a": [10.0, 20.0, 15.0], "b": [11.0, 18.0, 16.0], "c": [20.0, 41.0, 29.0]}, "a")
     ['b']
     """
@@ -107,17 +103,11 @@ def not_worse(errors: Mapping[str, Sequence[float]], best: str) -> list[str]:
 
 @dataclasses.dataclass(frozen=True)
 class Recommendation(Generic[C]):
-    """The law or vehicle to be recommended and those that it was chosen from.
-
-    Attributes:
-        rung: the law.
-        alike: the laws that predict as well as any, this one among them, from simple to complex.
-        doubted: of these, or with a smaller error, those that were left aside because of their `doubt`.
-    """
+    """The law or vehicle to be recommended and those that it was chosen from."""
 
     rung: C
-    alike: tuple[C, ...]
-    doubted: tuple[C, ...]
+    alike: tuple[C, ...]  # those that predict as well as any, this one among them, from simple to complex
+    doubted: tuple[C, ...]  # of these, or with a smaller error, those that were left aside because of their `doubt`
 
 
 def judged_on_held_out(rungs: Sequence[C]) -> list[C]:
@@ -132,9 +122,6 @@ def recommendation(rungs: Sequence[C]) -> Recommendation[C]:
     at most 10 % worse over all samples. A law that did not converge, or with numbers at bounds or not identifiable, is
     left aside where another is as good, or else nearly as good (within 10 %). Laws that could not be judged on motion
     held out are recommended only if none could.
-
-    Arguments:
-        rungs: the laws, at least one.
     """
     judged = judged_on_held_out(rungs)
     first, floor = best_of(judged), judged[0].floor

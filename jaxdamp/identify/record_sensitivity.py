@@ -18,7 +18,7 @@ from jaxdamp.identify.criteria import Priors
 from jaxdamp.identify.estimating import at_ends
 from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.propagation import Evidence
-from jaxdamp.identify.traces import Batch
+from jaxdamp.identify.traces import signals
 from jaxdamp.parameters import FreeParameters
 
 
@@ -114,20 +114,22 @@ def sensitivity_to_records(
     inner = minimum.hessian[np.ix_(minimum.moves, minimum.moves)] * np.outer(scale, scale)
     adjoint = np.zeros(slopes.shape)
     adjoint[:, minimum.moves] = np.linalg.solve(inner, (slopes[:, minimum.moves] * scale).T).T * scale
-    at = _samples(problem)
-    by_residual = (adjoint @ minimum.jacobian.T)[:, at.used]
-    by_force = by_residual * at.weight
-    weighed = by_residual * minimum.residual[at.used]
-    of_record = [at.owner == i for i in range(len(runs))]
+    used, owner = problem.used, problem.owner[problem.used]
+    channels = ("force", "weight", "velocity", "stroke")
+    force, weight, velocity, stroke = (np.asarray(a, float)[used] for a in signals(problem.residuals, *channels))
+    by_residual = (adjoint @ minimum.jacobian.T)[:, used]
+    by_force = by_residual * weight
+    weighed = by_residual * minimum.residual[used]
+    of_record = [owner == i for i in range(len(runs))]
     pull = np.stack([weighed[:, k].sum(axis=1) for k in of_record])  # adjoint times the gradient of each record
-    gain = np.stack([(by_force[:, k] * at.force[k]).sum(axis=1) for k in of_record])
+    gain = np.stack([(by_force[:, k] * force[k]).sum(axis=1) for k in of_record])
     offset = np.stack([by_force[:, k].sum(axis=1) for k in of_record])
     if problem.each:  # each record is divided by its own RMS force, which changes too
         squares = np.array([np.sum(run.force**2) for run in runs])
         sums = np.array([np.sum(run.force) for run in runs])
         gain, offset = gain + 2.0 * pull, offset + 2.0 * pull * (sums / squares)[:, None]
-        blocks = at.weight**2 * squares[at.owner]  # measured samples in each one that is compared
-        by_force = by_force + 2.0 * pull[at.owner].T * blocks * at.force / squares[at.owner]
+        blocks = weight**2 * squares[owner]  # measured samples in each one that is compared
+        by_force = by_force + 2.0 * pull[owner].T * blocks * force / squares[owner]
     warnings = ()
     if not minimum.last_step < AT_MINIMUM:
         warnings = ("The minimum lies at a kink of the law: its derivatives hold on one side only.",)
@@ -138,8 +140,8 @@ def sensitivity_to_records(
         by_gain=dict(zip(names, gain.T, strict=True)),
         by_offset=dict(zip(names, offset.T, strict=True)),
         by_sample={name: tuple(row[k] for k in of_record) for name, row in zip(names, by_force, strict=True)},
-        velocity=tuple(at.velocity[k] for k in of_record),
-        stroke=tuple(at.stroke[k] for k in of_record),
+        velocity=tuple(velocity[k] for k in of_record),
+        stroke=tuple(stroke[k] for k in of_record),
         held=tuple(map(str, held)),
         warnings=warnings,
     )
@@ -232,25 +234,3 @@ def _function(
     centre = jnp.asarray(values, evidence.problem.free.values.dtype)
     at, slopes = compiled_for_loops(with_jacobian(stacked))(centre)
     return names, np.asarray(at, np.float64), np.asarray(slopes, np.float64)
-
-
-class _Samples(NamedTuple):
-    """The samples of all residuals that are compared."""
-
-    used: np.ndarray  # which of all
-    owner: np.ndarray  # number of the record of each
-    force: np.ndarray
-    weight: np.ndarray
-    velocity: np.ndarray
-    stroke: np.ndarray
-
-
-def _samples(problem: Problem) -> _Samples:
-    """The samples that are compared, of a fit to bench records."""
-    batches = [part for part in problem.residuals if isinstance(part, Batch)]
-    used = np.concatenate([batch.used() for batch in batches])
-    columns = (
-        np.concatenate([np.ravel(np.asarray(getattr(batch, name), np.float64)) for batch in batches])[used]
-        for name in ("force", "weight", "velocity", "stroke")
-    )
-    return _Samples(used, problem.owner[used], *columns)

@@ -30,19 +30,12 @@ Ahead = Callable[[Rung, AbstractDamper, tuple[str, ...]], Begun | None]
 
 
 class Simpler(NamedTuple):
-    """A law with less in it than another.
+    """A law with less in it than another."""
 
-    Attributes:
-        law: to start from.
-        words: what it lacks.
-        weak: how many of the numbers that it lacks were not determined.
-        share: of these among the numbers that it lacks.
-    """
-
-    law: AbstractDamper
-    words: str
-    weak: int
-    share: float
+    law: AbstractDamper  # to start from
+    words: str  # what it lacks
+    weak: int  # how many of the numbers that it lacks were not determined
+    share: float  # of these among the numbers that it lacks
 
 
 def simpler_laws(law: AbstractDamper, weak: Sequence[str], fastest: float, path: str = "") -> Iterator[Simpler]:
@@ -52,11 +45,8 @@ def simpler_laws(law: AbstractDamper, weak: Sequence[str], fastest: float, path:
     curve becomes one of fewer numbers; friction with breakaway, with a shape or with several elements becomes a viscous
     force beside friction that follows the velocity, `CoulombFriction`, and elastic friction, `Dahl`.
 
-    Arguments:
-        law: the law, or a part of one.
-        weak: paths of the undetermined numbers, for vectors once for each number.
-        fastest: largest velocity [m/s] of the records.
-        path: prefix of the paths of this part.
+    `weak` are the paths of the undetermined numbers, for vectors once for each number; `fastest` is the largest
+    velocity [m/s] of the records, `path` the prefix of the paths of this part.
 
     >>> from jaxdamp.dampers import CoulombFriction, Lag, Linear
     >>> law = Lag(Linear(1500.0) + CoulombFriction(20.0, 0.02), 0.005)
@@ -121,23 +111,12 @@ def _size(law: AbstractDamper) -> int:
 
 
 def held_of(law: AbstractDamper, fastest: float) -> tuple[str, ...]:
-    """Paths of the numbers that are not fitted: at zero where they may be, or without effect.
-
-    Arguments:
-        law: a law made simpler.
-        fastest: largest velocity [m/s] of the records.
-    """
+    """Paths of numbers that are not fitted: at zero where they may be, or without effect up to a velocity [m/s]."""
     zero = [p.path for p in parameters(law) if p.domain is nonnegative and not np.any(p.value)]
     return *zero, *(place + name for place, part in laws_inside(law) for name in part.without_effect(fastest))
 
 
-def nothing_ahead(source: Rung, law: AbstractDamper, held: tuple[str, ...]) -> None:
-    """One fit after the other."""
-
-
-def reduced(
-    rungs: Sequence[Rung], fitted: Fitted, progress: Callable[[str], None], ahead: Ahead = nothing_ahead
-) -> Iterator[Rung]:
+def reduced(rungs: Sequence[Rung], fitted: Fitted, progress: Callable[[str], None], ahead: Ahead) -> Iterator[Rung]:
     """A law all of whose numbers are determined, in place of one recommended in spite of doubt or left aside for it.
 
     Parts with undetermined numbers are left out one after the other, while the error on motion held out stays within
@@ -145,11 +124,7 @@ def reduced(
     remains, the one with the smallest error; a law without doubt that is only within the 10 % is the last resort. Where
     a law without doubt would be recommended, one that predicts better by more than these 2 % is tried.
 
-    Arguments:
-        rungs: the laws.
-        fitted: fits and judges a law made simpler from a rung, with numbers to be held.
-        progress: called with the name of each law that is made simpler.
-        ahead: begins, beside a fit, the one that follows if this one does not predict as well; None where it cannot.
+    `ahead` begins, beside a fit, the one that follows if this one does not predict as well; None where it cannot.
     """
     best = recommendation(rungs).rung
     judged = sorted(judged_on_held_out(rungs), key=lambda rung: rung.error)
@@ -222,11 +197,7 @@ def _with_held(law: AbstractDamper, fastest: float) -> tuple[AbstractDamper, tup
 
 
 def without_zero_terms(law: AbstractDamper) -> AbstractDamper:
-    """A sum without terms all of whose numbers are zero, which give no force; other laws as they are.
-
-    Arguments:
-        law: any law.
-    """
+    """A sum without terms all of whose numbers are zero, which give no force; other laws as they are."""
     if not isinstance(law, Sum):
         return law
     terms = [term for term in law.terms if any(np.asarray(p.value).any() for p in parameters(term))]

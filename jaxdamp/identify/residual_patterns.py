@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
-from jaxdamp.identify.traces import Batch
+from jaxdamp.identify.traces import signals
 from jaxdamp.rig import delayed_samples, lagged_samples
 
 
@@ -57,13 +57,8 @@ class Record(NamedTuple):
 
 
 def records_of(problem: Problem, best: SearchEnd) -> Iterator[Record]:
-    """Each fitted record in the residuals.
-
-    Arguments:
-        problem: a problem on bench records that was minimised.
-        best: its minimum.
-    """
-    stroke, velocity, force, weight = (_channel(problem, name) for name in ("stroke", "velocity", "force", "weight"))
+    """Each fitted record in the residuals."""
+    stroke, velocity, force, weight = signals(problem.residuals, "stroke", "velocity", "force", "weight")
     predicted = force + np.divide(best.residual[: weight.size], weight, out=np.zeros_like(force), where=weight > 0)
     first = [run.temperature[0] for run in problem.runs if run.temperature is not None]
     place = np.cumsum(problem.used) - 1
@@ -82,19 +77,8 @@ def records_of(problem: Problem, best: SearchEnd) -> Iterator[Record]:
         yield Record(i, place[at], weight[at], motion, cycle if at.size >= 2 * cycle else 0)
 
 
-def _channel(problem: Problem, name: str) -> Values:
-    """One channel at all samples of the residuals of bench records."""
-    parts = [part for part in problem.residuals if isinstance(part, Batch)]
-    return np.concatenate([np.ravel(np.asarray(getattr(part, name))) for part in parts])
-
-
 def column(records: Sequence[Record], change: Callable[[Motion], Values]) -> Float[np.ndarray, "samples 1"]:
-    """The weighted change of the force by an effect, over all used samples.
-
-    Arguments:
-        records: all of them.
-        change: of the measured force in one record [N].
-    """
+    """The weighted change of the force [N] by an effect, over all used samples."""
     values = np.zeros((sum(record.at.size for record in records), 1))
     for _, at, weight, motion, _ in records:
         values[at, 0] = weight * change(motion)
@@ -102,12 +86,7 @@ def column(records: Sequence[Record], change: Callable[[Motion], Values]) -> Flo
 
 
 def proportional(problem: Problem, records: Sequence[Record]) -> list[Pattern]:
-    """The effects of a machine that are proportional to their size, the likelier ones first.
-
-    Arguments:
-        problem: the problem.
-        records: its records in the residuals.
-    """
+    """The effects of a machine that are proportional to their size, the likelier ones first."""
     machine = 'add "{}" to the machine (`rig`)'
     kinds: list[tuple[str, bool, str, str, Callable[[Motion], Values]]] = [
         (
@@ -209,9 +188,7 @@ def _curve(records: Sequence[Record]) -> Pattern:
 def hysteresis(records: Sequence[Record], late: dict[str, float]) -> Pattern:
     """A force that is late by another time in each record and direction, which is memory of a damper.
 
-    Arguments:
-        records: all of them.
-        late: delay and lag of the force [s] that were found before, by name.
+    `late` are delay and lag of the force [s] that were found before.
     """
     values = np.zeros((sum(record.at.size for record in records), 2 * len(records)))
     for k, (_, at, weight, motion, _) in enumerate(records):

@@ -123,13 +123,7 @@ def ladder_table(rungs: Sequence[Rung], failed: Sequence[Failure] = (), recommen
 
 
 def cannot_choose(errors: Mapping[str, Sequence[float]], best: str, numbers: Mapping[str, int]) -> list[str]:
-    """A sentence on laws that the records cannot tell from the best one, if there are any.
-
-    Arguments:
-        errors: RMSE [N] on each record by law.
-        best: the law with the smallest error.
-        numbers: of free parameters of each law.
-    """
+    """A sentence on laws that the records cannot tell from the best one by their RMSE [N], if there are any."""
     alike = [best, *not_worse(errors, best)]
     if len(alike) == 1:
         return []
@@ -141,13 +135,7 @@ def cannot_choose(errors: Mapping[str, Sequence[float]], best: str, numbers: Map
 
 
 def verdict(choice: Recommendation[Rung], rungs: Sequence[Rung], held_out: Sequence[BenchRun]) -> tuple[str, ...]:
-    """Sentences on the recommended law, why it is this one, and the shares of the errors of the laws.
-
-    Arguments:
-        choice: the recommendation.
-        rungs: the fitted laws, at least one.
-        held_out: the records that they were scored on, if any were given.
-    """
+    """Sentences on the recommended law, why it is this one, and the shares of the errors of the laws."""
     best = choice.rung
     static = [rung for rung in rungs if is_memoryless(rung.result.law)]
     sentences = [_error_of(best, rungs, held_out), *why(choice, rungs, made=best.reduced)]

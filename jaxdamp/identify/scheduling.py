@@ -30,7 +30,7 @@ from jaxdamp.identify.predicting import score
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.settings import FIT, PROBLEM, SCHEDULED, FitSettings, ScheduledSettings
 from jaxdamp.identify.starting import Start, frozen_by
-from jaxdamp.identify.stated import stated_parameters
+from jaxdamp.identify.stated import COMMAND_REMEDY, refuse_lacking, stated_parameters
 from jaxdamp.parameters import get, match_paths, name_patterns, parameters, with_values
 from jaxdamp.rig import Rig
 
@@ -220,9 +220,7 @@ def fit_scheduled(
 
 def settings_stated(runs: Sequence[BenchRun]) -> tuple[BenchRun, ...]:
     """The records, all of which must state a command or have a channel of it, those that hold it two or more."""
-    remedy = 'Pass it when reading, `bench.read(..., command={"*_0.5A": 0.5})`.'
-    if lacking := [run.name for run in runs if run.commands is None]:
-        _checks.refuse("runs", "all state their command", f"without one: {', '.join(lacking)}", remedy)
+    refuse_lacking("command", [run for run in runs if run.commands is None], COMMAND_REMEDY)
     if len(commands := {run.command for run in runs if run.command is not None}) < 2:
         remedy = "Use `fit` for one setting, and with a start, `Scheduled(...)`, where the command varies in all."
         _checks.refuse("runs", "have two commands or more that are held", f"records of {commands or 'none'}", remedy)

@@ -26,6 +26,7 @@ from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, least_square
 
 
 Solver = optx.AbstractLeastSquaresSolver | optx.AbstractMinimiser
+SOLVER = BoundedLevenbergMarquardt()  # of fits, unless they are given another one
 
 
 class SearchEnd(NamedTuple):
@@ -73,12 +74,17 @@ class _Point(NamedTuple):
 
 
 class Searches:
-    """Searches of one problem by `BoundedLevenbergMarquardt`, which share all that is made for the first."""
+    """Searches of one problem, which share all that is made for the first.
 
-    def __init__(self, problem: Problem) -> None:
-        self.problem, self.coordinates = problem, problem.coordinates
+    `solver` is a `BoundedLevenbergMarquardt` with tolerances of its own, or any other solver of optimistix, which then
+    searches in coordinates without bounds.
+    """
+
+    def __init__(self, problem: Problem, solver: Solver | None = None) -> None:
+        self.problem, self.coordinates, self._solver = problem, problem.coordinates, solver or SOLVER
         self._kind = problem.free.values.dtype
-        self._printed = evaluator(problem.free, problem.residuals) if self._kind == np.float64 else None
+        by_c = self._kind == np.float64 and isinstance(self._solver, BoundedLevenbergMarquardt)
+        self._printed = evaluator(problem.free, problem.residuals) if by_c else None
         self._to_values = self.coordinates.on_host() if self._printed else None
 
     @property
@@ -87,33 +93,24 @@ class Searches:
         return self._printed is not None
 
     def of(self, problem: Problem, printed: Evaluator | None) -> "Searches":
-        """Those of another problem with the same free numbers."""
+        """Those of another problem with the same free numbers, by the solver of fits."""
         other = copy.copy(self)
-        other.problem, other._printed = problem, printed
+        other.problem, other._printed, other._solver = problem, printed, SOLVER
         return other
 
-    def end(
-        self,
-        values: Float[np.ndarray, " free"],
-        max_steps: int,
-        *,
-        held: int | None = None,
-        solver: BoundedLevenbergMarquardt | None = None,
-    ) -> SearchEnd:
-        """Minimise the sum of squares.
+    def end(self, values: Float[np.ndarray, " free"], max_steps: int, *, held: int | None = None) -> SearchEnd:
+        """Minimise the sum of squares from physical values, in so many points at most, the start among them.
 
-        Arguments:
-            values: physical values to start from.
-            max_steps: largest number of points tried, including the start.
-            held: index of a parameter that is held at its start.
-            solver: with tolerances of its own.
+        The parameter of the index `held` stays at its start.
         """
+        if not isinstance(self._solver, BoundedLevenbergMarquardt):
+            return _search_unbounded(self.problem.started_at(values), max_steps, self._solver)
         lower, upper = (np.array(side, np.float64) for side in self.coordinates.bounds())
         start = np.asarray(self.coordinates.from_physical(values), np.float64)
         if held is not None:
             lower[held] = upper[held] = start[held]
         limits = {"lower": lower, "upper": upper, "precision": float(jnp.finfo(self._kind).eps)}
-        bounded = dataclasses.replace(solver or BoundedLevenbergMarquardt(), **limits)
+        bounded = dataclasses.replace(self._solver, **limits)
         end = least_squares_on_host(self._at, bounded, start[None], max_steps)
         point: _Point = end.aux
         return SearchEnd(point.values[0], point.residual[0], point.jacobian[0], end.status[0], int(end.steps[0]))
@@ -122,7 +119,12 @@ class Searches:
         del lanes  # there is one
         here = self.here(y[0])
         reduced = self._printed.triangle(here.whole) if self._printed else here.whole
-        return _linearised(self.problem, here, reduced)
+        anchor, whole = self.problem.anchor_rows(here.values), here.whole
+        whole = np.concatenate([whole, anchor]) if anchor.size else whole
+        rows = triangle(np.concatenate([reduced, anchor]) if anchor.size else reduced)
+        rows = np.concatenate([rows[:, :-1] @ here.units, rows[:, -1:]], axis=1) / self.problem.level
+        point = _Point(here.values[None], whole[None, :, -1], whole[None, :, :-1])
+        return Linearisation(rows[None], here.margins[None], here.slopes[None], np.array([float(len(whole))])), point
 
     def here(self, y: Float[np.ndarray, " free"]) -> Here:
         """The problem at coordinates."""
@@ -153,33 +155,13 @@ def searches_of(problems: Sequence[Problem]) -> list[Searches]:
 
 
 def search(problem: Problem, max_steps: int, solver: Solver | None = None) -> SearchEnd:
-    """Minimise the sum of squares from the start of a problem.
-
-    Arguments:
-        problem: the problem with its start.
-        max_steps: largest number of points tried, including the start.
-        solver: a `BoundedLevenbergMarquardt` with tolerances of its own, or any other solver of optimistix, which then
-            searches in coordinates without bounds.
-    """
-    if solver is not None and not isinstance(solver, BoundedLevenbergMarquardt):
-        return _search_unbounded(problem, max_steps, solver)
-    return Searches(problem).end(np.asarray(problem.free.values), max_steps, solver=solver)
+    """Minimise the sum of squares from the start of a problem, in so many points at most, the start among them."""
+    return Searches(problem, solver).end(np.asarray(problem.free.values), max_steps)
 
 
 def _by_xla(problem: Problem, coordinates: Coordinates, y: Array) -> Here:
     """The problem at a point, by the one compiled program."""
     return Here(*(np.asarray(a, np.float64) for a in _evaluated(coordinates, y, problem.residuals)))
-
-
-@np.errstate(over="ignore", invalid="ignore")
-def _linearised(problem: Problem, here: Here, reduced: np.ndarray) -> tuple[Linearisation, _Point]:
-    """The problem at a point, from what `_evaluated` gives and rows with the same products of columns."""
-    anchor, whole = problem.anchor_rows(here.values), here.whole
-    whole = np.concatenate([whole, anchor]) if anchor.size else whole
-    rows = triangle(np.concatenate([reduced, anchor]) if anchor.size else reduced)
-    rows = np.concatenate([rows[:, :-1] @ here.units, rows[:, -1:]], axis=1) / problem.level
-    point = _Point(here.values[None], whole[None, :, -1], whole[None, :, :-1])
-    return Linearisation(rows[None], here.margins[None], here.slopes[None], np.array([float(len(whole))])), point
 
 
 @compiled_for_loops

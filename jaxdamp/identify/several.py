@@ -18,7 +18,6 @@ from jaxdamp.identify.printed import evaluator
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd, Searches, Solver, search
 from jaxdamp.parameters import FreeParameters
-from jaxdamp.solve import BoundedLevenbergMarquardt
 
 
 FIRST_LOOK = 10  # steps after which starts are compared
@@ -68,10 +67,8 @@ class _Searcher:
     """Searches from several starts: whole ones on all samples, first looks on the first part of long records."""
 
     def __init__(self, problem: Problem, solver: Solver | None, starts: int | None) -> None:
-        own = isinstance(solver, BoundedLevenbergMarquardt)
-        self.problem, self._bounded, self._other = problem, solver if own else None, None if own else solver
-        self._whole, self._part = Searches(problem) if self._other is None else None, None
-        if starts != 1 and self._whole and self._whole.is_printed and (part := first_part(problem)):
+        self.problem, self._whole, self._part = problem, Searches(problem, solver), None
+        if starts != 1 and self._whole.is_printed and (part := first_part(problem)):
             self._part = self._whole.of(part, evaluator(part.free, part.residuals))
 
     @property
@@ -87,9 +84,7 @@ class _Searcher:
 
     def end(self, values: Float[np.ndarray, " free"], steps: int) -> SearchEnd:
         """The end of a search on all samples."""
-        if self._whole is None:
-            return search(self.problem.started_at(values), steps, solver=self._other)
-        return self._whole.end(values, steps, solver=self._bounded)
+        return self._whole.end(values, steps)
 
     def to_its_end(self, end: SearchEnd, max_steps: int) -> SearchEnd:
         """The end of a search on all samples that went fewer steps than it may take."""

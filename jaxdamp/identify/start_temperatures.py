@@ -35,13 +35,7 @@ class Warmed(NamedTuple):
 
 
 def unknown_starts(model: Model, runs: Sequence[BenchRun], per_record: Collection[str]) -> list[str]:
-    """Paths of the starts that a new record needs, where each of the fitted records had one of its own; else none.
-
-    Arguments:
-        model: the fitted model.
-        runs: the fitted records.
-        per_record: paths of the parameters with a value for each of them.
-    """
+    """Paths of the starts that a new record needs, where each of the fitted records had one of its own; else none."""
     paths = start_paths(model)
     if own := [path for path in paths if path in per_record]:
         return own
@@ -66,12 +60,8 @@ def warmed(model: Model, run: BenchRun, paths: Sequence[str], noise: float, init
     It is the most likely one, 20 K about that of the model known beforehand, by Gauss and Newton's method. Without an
     effect on the force it stays where it is.
 
-    Arguments:
-        model: the fitted model, with the mean start of the fitted records.
-        run: a record that states no temperature.
-        paths: the starts [K] in the model, which all move together.
-        noise: standard deviation of the force about the model [N].
-        initial_state: as in `fit`.
+    `model` has the mean start of the fitted records; `paths` are the starts [K] in it, which all move together; `noise`
+    is the standard deviation of the force [N] about the model.
     """
     told = first_samples(run)
     (batch,), (at,) = batches(model, [run], [1.0], SAMPLES_PER_CYCLE, (), initial_state)

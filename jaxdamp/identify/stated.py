@@ -31,19 +31,12 @@ def stated_values(model: Model, runs: Sequence[BenchRun]) -> dict[str, list[floa
 
     The command, if the law has one and it is held in all; the temperature at the start, if it says something of the
     force and no record has a channel of it; and parameters that settings state (`stated_parameters`).
-
-    Arguments:
-        model: a law, on a machine or not.
-        runs: the records.
-
-    Raises:
-        ValueError: records of which only some state one of them; a command that the law cannot have.
     """
     commands, law = [run.command for run in runs if run.command is not None], law_of(model)
     warm = _temperatures(model, runs) | stated_parameters(model, runs)
     if not takes_command(law) or not commands or _vary(runs):
         return warm
-    _refuse_some("command", runs, COMMAND_REMEDY)
+    refuse_lacking("command", [run for run in runs if run.command is None], COMMAND_REMEDY)
     for command in set(commands):
         with_command(law, command)  # refuses what is out of range
     return warm | dict.fromkeys(command_paths(model), commands)
@@ -54,13 +47,8 @@ def stated_parameters(model: Model, runs: Sequence[BenchRun]) -> dict[str, list[
 
     Such as `settings={"gas.pressure": "20 bar"}`: a number with a unit, by the name or its last part.
 
-    Arguments:
-        model: a law, on a machine or not.
-        runs: the records, all of which state them, or none.
-
-    Raises:
-        ValueError: a number without a unit of the parameter, or outside its domain; records that do not state it; a
-            misspelt name.
+    Refused are a number without a unit of the parameter or outside its domain, records of which only some state it, and
+    a misspelt name.
     """
     names = {name for run in runs for name in run.settings if name != TEMPERATURE}
     if not names:
@@ -75,8 +63,7 @@ def stated_parameters(model: Model, runs: Sequence[BenchRun]) -> dict[str, list[
 
 def _of_records(name: str, parameter: Parameter, runs: Sequence[BenchRun]) -> list[float]:
     """The values of a parameter that all records state, in its unit."""
-    if lacking := [run.name for run in runs if name not in run.settings]:
-        _checks.refuse("runs", f"all state their {name}", f"without one: {', '.join(lacking)}", APART)
+    refuse_lacking(name, [run for run in runs if name not in run.settings], APART)
     values = []
     for run in runs:
         number, unit = number_and_unit(run.settings[name])
@@ -100,20 +87,14 @@ def _temperatures(model: Model, runs: Sequence[BenchRun]) -> dict[str, list[floa
     kelvins = {run: initial_temperature(run) for run in runs}
     if all(kelvin is None for kelvin in kelvins.values()):
         return {}
-    if lacking := [run.name for run, kelvin in kelvins.items() if kelvin is None]:
-        remedy = f'State it, `settings={{"temperature": "20 degC"}}`. {APART}'
-        _checks.refuse("runs", "all state their temperature", f"without one: {', '.join(lacking)}", remedy)
+    remedy = f'State it, `settings={{"temperature": "20 degC"}}`. {APART}'
+    refuse_lacking("temperature", [run for run, kelvin in kelvins.items() if kelvin is None], remedy)
     each = [at_start(model, kelvin) for run in runs if (kelvin := kelvins[run]) is not None]
     return {path: [values[path] for values in each] for path in each[0]}
 
 
 def at_start(model: Model, kelvin: float) -> dict[str, float]:
-    """The numbers of a model that a temperature [K] at the start of a record sets, by path; none if it has no effect.
-
-    Arguments:
-        model: a law, on a machine or not.
-        kelvin: the temperature of the damper [K].
-    """
+    """The numbers of a model that a temperature [K] at the start of a record sets, by path; none without an effect."""
     values, rig = values_at_start(model, kelvin), rig_of(model)
     if rig is not None and "heat" in rig.effects():
         values |= {"rig.initial_rise": kelvin - rig.reference_temperature}
@@ -121,12 +102,7 @@ def at_start(model: Model, kelvin: float) -> dict[str, float]:
 
 
 def with_stated(model: Model, stated: Mapping[str, Sequence[float]]) -> Model:
-    """The model with the mean of what records state, apart from laws at levels of a command, which have their own.
-
-    Arguments:
-        model: a law, on a machine or not.
-        stated: of `stated_parameters`.
-    """
+    """The model with the mean of what records state, apart from laws at levels of a command, which have their own."""
     levels = tuple(prefix for prefix, law in laws_inside(model) if isinstance(law, Scheduled))
     return with_values(model, {p: np.mean(v) for p, v in stated.items() if not (levels and p.startswith(levels))})
 
@@ -138,22 +114,13 @@ def start_paths(model: Model) -> list[str]:
 
 
 def gas_charges(law: AbstractDamper) -> list[tuple[str, AbstractDamper]]:
-    """The laws inside whose static force has a meaning of its own, such as a gas charge, with prefixes of their paths.
-
-    Arguments:
-        law: the damper law.
-    """
+    """The laws inside whose static force has a meaning of its own, such as a gas charge, by the prefixes of paths."""
     parts = [(prefix, part) for prefix, part in laws_inside(law) if not part.inner_laws()]
     return [(prefix, part) for prefix, part in parts if part.traits().contains_offset and not part.constant_forces()]
 
 
 def charged_apart(law: AbstractDamper, runs: Sequence[BenchRun]) -> bool:
-    """Whether the records state several values of a gas charge, so that a constant force is told from it.
-
-    Arguments:
-        law: the damper law.
-        runs: the records.
-    """
+    """Whether the records state several values of a gas charge, so that a constant force is told from it."""
     prefixes = tuple(prefix for prefix, _ in gas_charges(law))
     stated = stated_parameters(law, runs).items() if prefixes else ()
     return any(np.ptp(values) > 0.0 for path, values in stated if path.startswith(prefixes))
@@ -164,25 +131,20 @@ def _vary(runs: Sequence[BenchRun]) -> bool:
     return any(run.command_channel is not None for run in runs)
 
 
-def _refuse_some(what: str, runs: Sequence[BenchRun], remedy: str) -> None:
-    """Refuse records of which some state what others do not."""
-    lacking = [run.name for run in runs if getattr(run, what) is None]
-    if lacking:
-        _checks.refuse("runs", f"all state their {what}", f"without one: {', '.join(lacking)}", remedy)
+def refuse_lacking(what: str, runs: Sequence[BenchRun], remedy: str) -> None:
+    """Refuse those of the records that do not state what others do, if there are any."""
+    if runs:
+        lacking = ", ".join(run.name for run in runs)
+        _checks.refuse("runs", f"all state their {what}", f"without one: {lacking}", remedy)
 
 
 def followed_channels(model: Model, runs: Sequence[BenchRun]) -> list[str]:
-    """The channels that a model is compared with, the temperature among them if it says something of the force.
-
-    Arguments:
-        model: a law, on a machine or not.
-        runs: the records.
-    """
+    """The channels that a model is compared with, the temperature among them if it says something of the force."""
     channels, rig = ["stroke", "velocity", "force"], rig_of(model)
     law = law_of(model)
     varying = ["command"] if takes_command(law) and _vary(runs) else []
     if varying:
-        _refuse_some("commands", runs, COMMAND_REMEDY)
+        refuse_lacking("commands", [run for run in runs if run.commands is None], COMMAND_REMEDY)
         refuse_units(runs)
         for run in runs:
             check_commands(f"command of {run.name!r}", law, channel(run, "command"))
@@ -193,5 +155,5 @@ def followed_channels(model: Model, runs: Sequence[BenchRun]) -> list[str]:
         return channels + varying
     if all(run.temperature is None for run in runs):
         return channels + varying
-    _refuse_some("temperature", runs, APART)
+    refuse_lacking("temperature", [run for run in runs if run.temperature is None], APART)
     return [*channels, "temperature", *varying]

@@ -126,10 +126,6 @@ class TargetResiduals(AbstractResiduals):
         """The targets."""
         return np.arange(len(self.names) + self.padding) < len(self.names)
 
-    def total_weight(self) -> Float[Array, ""]:
-        """Sum of the squared weights."""
-        return jnp.sum(1.0 / jnp.square(self.tolerance))
-
 
 @of_known_numbers
 @one_thread()
@@ -178,7 +174,7 @@ def fit_targets(
     _checks.one_of("loss", loss, LOSSES)
     _checks.counts(starts=starts, max_steps=max_steps)
     free = _free(start, settings)
-    expected = priors_on(free, priors, 1.0)
+    expected = priors_on(free, priors)
     padding = max(free.values.size + 1 - len(goals), 0)
     wanted, allowed = (jnp.asarray(np.array(column, float)) for column in zip(*goals.values(), strict=True))
     residuals = TargetResiduals(numbers, wanted, allowed, tuple(goals), padding)

@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Float, Int
 
 from jaxdamp.bench import BenchRun
 from jaxdamp.identify.initial_states import Cycle
@@ -21,7 +21,7 @@ from jaxdamp.identify.model import (
     marched,
     starts_in,
 )
-from jaxdamp.identify.problem import AbstractResiduals
+from jaxdamp.identify.problem import AbstractResiduals, AbstractWeighted
 from jaxdamp.identify.rows import (
     LAG_ANGLE,
     Row,
@@ -42,7 +42,7 @@ MOST_GROUPS = 2  # batches of a law with states: each is compiled on its own
 
 
 @final
-class Batch(AbstractResiduals):
+class Batch(AbstractWeighted):
     """Records side by side, padded to one length; padded and unused samples have weight zero."""
 
     dt: Float[Array, " runs"]
@@ -58,10 +58,6 @@ class Batch(AbstractResiduals):
     command: Float[Array, "runs time"] | None = None  # where it varies in one of them
     cycle: Cycle | None = None  # before each record, where some start in the periodic solution
     effects: tuple[str, ...] = eqx.field(static=True, default=())  # of the machine (`Rig.effects`)
-
-    def predict(self, model: Model) -> Float[Array, "runs time"]:
-        """Force of the model under these strokes [N]."""
-        return self.settled_forces(model)[0]
 
     def settled_forces(self, model: Model) -> tuple[Float[Array, "runs time"], Float[Array, " runs"]]:
         """The forces [N], and the change of the states over the cycle before a record that starts periodically."""
@@ -96,17 +92,8 @@ class Batch(AbstractResiduals):
 
     def __call__(self, model: Model) -> Float[Array, " samples"]:
         """Weighted difference of the model's force from the measured one; zero where the weight is, even beside NaN."""
-        return self.missed_and_drift(model)[0]
-
-    def missed_and_drift(self, model: Model) -> tuple[Float[Array, " samples"], Float[Array, " runs"]]:
-        """The weighted difference, and the second of `settled_forces`."""
-        force, drift = self.settled_forces(model)
-        return jnp.ravel(jnp.where(self.weight > 0, (force - self.force) * self.weight, 0.0)), drift
-
-    def reweighted(self, factor: Float[np.ndarray, " samples"]) -> "Batch":
-        """The same with every weight times a factor."""
-        weight = np.asarray(self.weight)
-        return dataclasses.replace(self, weight=on_device(weight * factor.reshape(weight.shape)))
+        missed = self.settled_forces(model)[0] - self.force
+        return jnp.ravel(jnp.where(self.weight > 0, missed * self.weight, 0.0))
 
     def measurements(self) -> Float[Array, " samples"]:
         """The measured forces [N] of all samples, padding too."""
@@ -115,14 +102,6 @@ class Batch(AbstractResiduals):
     def with_measurements(self, numbers: Float[Array, " samples"]) -> "Batch":
         """The same with other measured forces."""
         return dataclasses.replace(self, force=numbers.reshape(self.force.shape))
-
-    def used(self) -> Bool[np.ndarray, " samples"]:
-        """Which samples count."""
-        return np.ravel(self.weight) > 0
-
-    def total_weight(self) -> Float[Array, ""]:
-        """Sum of the squared weights."""
-        return jnp.sum(jnp.square(self.weight))
 
 
 class SampleRange(NamedTuple):
@@ -227,16 +206,9 @@ def batches(
     weight zero too, unless they start in the periodic solution. For a law that cannot rest, so do rest before and after
     the motion.
 
-    Arguments:
-        model: the law, on a rig or not; only its memory and what it takes from the records matter.
-        runs: the records.
-        sigma: standard deviation [N] of the force for each record.
-        samples_per_cycle: see above; `None` takes every sample.
-        per_record: paths where the model that the batches are given has a value for each record.
-        initial_state: of `INITIAL_STATES`.
-
-    Returns:
-        The batches, and for each record where it is.
+    Only the memory of the model and what it takes from the records matter. Each record has a standard deviation of the
+    force [N], `sigma`; `per_record` are the paths where the model that the batches are given has a value for each.
+    Returned are the batches, and for each record where it is.
     """
     (answer,) = batches_of_each(model, [runs], [sigma], samples_per_cycle, per_record, initial_state)
     return answer
@@ -279,6 +251,12 @@ def places(made: Sequence[Batch], ranges: Sequence[SampleRange]) -> tuple[slice,
     begins = np.cumsum([0, *(batch.weight.size for batch in made)])
     rows = [int(begins[at.batch]) + at.row * made[at.batch].weight.shape[1] for at in ranges]
     return tuple(slice(row + at.start, row + at.stop) for row, at in zip(rows, ranges, strict=True))
+
+
+def signals(residuals: Sequence[AbstractResiduals], *names: str) -> list[Float[np.ndarray, " samples"]]:
+    """Channels or weights at the samples of all residuals of bench records."""
+    made = [part for part in residuals if isinstance(part, Batch)]
+    return [np.concatenate([np.ravel(np.asarray(getattr(batch, name))) for batch in made]) for name in names]
 
 
 def owners(made: Sequence[Batch], ranges: Sequence[SampleRange]) -> Int[np.ndarray, " samples"]:

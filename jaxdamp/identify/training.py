@@ -26,9 +26,9 @@ from jaxdamp.identify.machine import Machine
 from jaxdamp.identify.model import Model, covered_range, law_of, rig_of, with_range
 from jaxdamp.identify.predicting import score
 from jaxdamp.identify.preparing import prepare, weighting_of
-from jaxdamp.identify.problem import AbstractResiduals, Problem
+from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.starting import Start
-from jaxdamp.identify.traces import batches
+from jaxdamp.identify.traces import Batch, batches
 from jaxdamp.parameters import Coordinates, listed
 
 
@@ -250,13 +250,13 @@ class _Course(NamedTuple):
 def _course(
     coordinates: Coordinates,
     problem: Problem,
-    checked: Sequence[AbstractResiduals],
+    checked: Sequence[Batch],
     rule: Optimiser,
     steps: int,
     patience: int,
 ) -> _Course:
     """Descend until the steps are taken, or the error on the records held out no longer falls."""
-    used = problem.residuals
+    used = [part for part in problem.residuals if isinstance(part, Batch)]  # all of them: there are no priors
     level = float(np.sqrt(np.mean(np.concatenate([run.force for run in problem.fitted_to]) ** 2)))
     raw = jnp.asarray(coordinates.start, problem.free.values.dtype)
     state = rule.init(raw)
@@ -300,15 +300,15 @@ def _model(coordinates: Coordinates, raw: Array) -> Model:
     return coordinates.free.build(coordinates.to_physical(raw))
 
 
-def _mean_square(coordinates: Coordinates, raw: Array, residuals: Sequence[AbstractResiduals]) -> Array:
+def _mean_square(coordinates: Coordinates, raw: Array, residuals: Sequence[Batch]) -> Array:
     """Mean squared error [N²] of the law over the samples that count, each as often as it was measured."""
     model = _model(coordinates, raw)
     squares = jnp.stack([jnp.sum(jnp.square(part(model))) for part in residuals])
-    return jnp.sum(squares) / jnp.sum(jnp.stack([part.total_weight() for part in residuals]))
+    return jnp.sum(squares) / jnp.sum(jnp.stack([jnp.sum(jnp.square(part.weight)) for part in residuals]))
 
 
 @eqx.filter_jit
-def _error(coordinates: Coordinates, raw: Array, residuals: Sequence[AbstractResiduals]) -> Array:
+def _error(coordinates: Coordinates, raw: Array, residuals: Sequence[Batch]) -> Array:
     return jnp.sqrt(_mean_square(coordinates, raw, residuals))
 
 
@@ -317,7 +317,7 @@ def _descend(
     coordinates: Coordinates,
     raw: Array,
     state: PyTree,
-    residuals: Sequence[AbstractResiduals],
+    residuals: Sequence[Batch],
     rule: Optimiser,
     level: float,
     count: Array,

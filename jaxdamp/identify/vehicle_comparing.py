@@ -1,29 +1,41 @@
-"""`compare` of vehicles: forms of one vehicle fitted to the same drives, judged on drives left out."""
+"""`compare` of vehicles: forms of one vehicle fitted to the same drives, judged on drives left out in turn."""
 
 import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from jaxtyping import Bool, Float
 
 from jaxdamp import _checks
+from jaxdamp._one_thread import one_thread
 from jaxdamp._progress import Progress
 from jaxdamp._results import drawn_by
 from jaxdamp._tables import Cell, Column, Contents, Table, with_unit
 from jaxdamp.bench import RideRecord
 from jaxdamp.identify.comparison import AbstractComparison, naming_only, side_by_side
+from jaxdamp.identify.held_out import PARTS, REFIT_STEPS, anchored_at
 from jaxdamp.identify.model import VehicleTest
+from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.recommending import doubt_of, why
 from jaxdamp.identify.rungs import Failure
+from jaxdamp.identify.search import search
 from jaxdamp.identify.vehicle_fitting import fit_vehicle
-from jaxdamp.identify.vehicle_held_out import on_drives, without_drives
 from jaxdamp.identify.vehicle_preparing import checked_records
-from jaxdamp.identify.vehicle_result import ChannelScore, VehicleFit
+from jaxdamp.identify.vehicle_residuals import RideBatch
+from jaxdamp.identify.vehicle_result import (
+    ChannelScore,
+    VehicleFit,
+    channel_score,
+    fitted_channels,
+    table_of_scores,
+)
 from jaxdamp.parameters import parameters
 from jaxdamp.vehicles import AbstractVehicle
 
 
 EXACT = 1e-4  # of the standard deviation of a channel: smaller errors are all alike
+FEWEST_DRIVES = 3  # whose errors show by how much they vary; of fewer, parts are scored one by one
 
 
 class VehicleRung(NamedTuple):
@@ -92,11 +104,7 @@ class VehicleRung(NamedTuple):
 
     def scores_table(self) -> Table:
         """The error of each channel of each drive, or part of a drive, that was left out."""
-        columns = (Column("left out"), Column("channel"), Column("unit"), Column("RMSE", spec=".3g"))
-        columns += (Column("fit", "%", ".1f"), Column("largest error", spec=".3g"))
-        return Table(
-            f"Errors of {self.name}: {self.judged_on}", columns, tuple(tuple(s)[: len(columns)] for s in self.scores)
-        )
+        return table_of_scores(f"Errors of {self.name}: {self.judged_on}", "left out", self.scores)
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -180,18 +188,7 @@ def compare_vehicles(
     progress: Callable[[str], None] | None = None,
     **options: Any,
 ) -> VehicleComparison:
-    """`compare` of vehicles on records of their motion.
-
-    Arguments:
-        vehicles: starts by name.
-        records: drives to fit.
-        held_out: drives to judge on, which are not fitted, instead of `records` in turn.
-        progress: called with each name before its fit; a line in the terminal if it is left out.
-        options: passed on to `fit_vehicle`; names of parameters that only some of the vehicles have concern these.
-
-    Raises:
-        ValueError: no vehicles, or none that could be fitted.
-    """
+    """`compare` of vehicles on records of their motion; `options` are those of `fit_vehicle`."""
     held = (held_out,) if isinstance(held_out, RideRecord) else tuple(held_out)
     with Progress("Fitting") as shown:
         outcomes = fit_each_vehicle(vehicles, records, held, progress=progress or shown, **options)
@@ -234,3 +231,82 @@ def fit_each_vehicle(
         return VehicleRung(name, result, *judged)
 
     yield from side_by_side(fitted, vehicles, progress)
+
+
+def without_drives(result: VehicleFit) -> tuple[tuple[ChannelScore, ...], str]:
+    """The errors of a fit on its own drives, each predicted by a fit to the others, and in words what was left out.
+
+    The fits start at the minimum of all. Of two drives or more, each is left out (in up to four groups). The quarters
+    in time are left out instead if there is one drive, or if numbers or initial motions of single drives are fitted,
+    which no other drive determines; the vehicle is driven through the part left out. Weights stay those of the fit of
+    all drives.
+    """
+    evidence = result.evidence
+    assert evidence is not None
+    problem, rides = anchored_at(evidence), result.records
+    whole = len(rides) > 1 and not problem.per_record and not problem.free.tree.starts
+    scores = list[ChannelScore]()
+    for number in range(min(PARTS, len(rides)) if whole else PARTS):
+        if whole:
+            left = [np.full(len(ride), i % PARTS == number) for i, ride in enumerate(rides)]
+        else:
+            left = [part == number for part in map(_quarter, rides)]
+        model = _refitted(problem, left)
+        for i, ride in enumerate(rides):
+            if left[i].any():
+                shown, counts = fitted_channels(problem, model, i)
+                alone = not whole or len(rides) >= FEWEST_DRIVES
+                scores += _scores(result, ride, shown, counts & left[i], alone=alone, number=None if whole else number)
+    how = f"each of {len(rides)} drives" if whole else f"each quarter of the drive{'s' * (len(rides) > 1)}"
+    return tuple(scores), f"{how} predicted by fits without it"
+
+
+def on_drives(result: VehicleFit, rides: Sequence[RideRecord]) -> tuple[tuple[ChannelScore, ...], str]:
+    """The errors of a fit on other drives, and these in words; in four parts of each if they are fewer than three."""
+    scores = list[ChannelScore]()
+    for ride in rides:
+        counts = ride.time - ride.time[0] >= result.settling
+        scores += _scores(result, ride, result.respond(ride), counts, alone=len(rides) >= FEWEST_DRIVES)
+    return tuple(scores), f"{len(rides)} drive{'s' * (len(rides) > 1)} held out"
+
+
+def _scores(
+    result: VehicleFit,
+    ride: RideRecord,
+    shown: dict[str, Float[np.ndarray, " time"]],
+    counts: Bool[np.ndarray, " time"],
+    *,
+    alone: bool,
+    number: int | None = None,
+) -> list[ChannelScore]:
+    """The errors of each channel of a drive: as a whole, in quarters, or of the quarter that was left out."""
+    parts = {ride.name if number is None else f"{ride.name}, part {number + 1} of {PARTS}": counts}
+    if not alone:
+        quarter = _quarter(ride)
+        parts = {f"{ride.name}, part {k + 1} of {PARTS}": counts & (quarter == k) for k in range(PARTS)}
+    return [
+        channel_score(
+            name, channel, result.vehicle.units[channel], ride[channel][part], values[part] - ride[channel][part]
+        )
+        for name, part in parts.items()
+        for channel, values in shown.items()
+        if part.any()
+    ]
+
+
+def _quarter(ride: RideRecord) -> np.ndarray:
+    """The number of the quarter in time of each sample."""
+    return np.arange(len(ride)) * PARTS // len(ride)
+
+
+@one_thread()
+def _refitted(problem: Problem, left: Sequence[Bool[np.ndarray, " _"]]) -> VehicleTest:
+    """The model fitted to the samples that are not left out."""
+    factor = np.ones(problem.used.size)
+    for part, own in problem.by_part(factor):
+        if isinstance(part, RideBatch):
+            shaped = own.reshape(part.weight.shape)
+            for row, number in enumerate(np.asarray(part.number)):
+                shaped[row, :, left[number]] = 0.0
+    end = search(problem.reweighted(factor), REFIT_STEPS)
+    return problem.free.started_at(end.values).tree

@@ -6,7 +6,6 @@ import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Unpack
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -20,7 +19,7 @@ from jaxdamp.identify.criteria import LOSSES, criterion_in_words, priors_on, sol
 from jaxdamp.identify.estimating import estimate
 from jaxdamp.identify.judging import MOST_WARNINGS, fields_of_fit, on_status
 from jaxdamp.identify.machine import Machine, started_machine
-from jaxdamp.identify.model import VehicleTest, own_names
+from jaxdamp.identify.model import VehicleTest, own_names, spread, with_means
 from jaxdamp.identify.noise import Noise, channel_noise
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd, search
@@ -37,14 +36,13 @@ from jaxdamp.identify.vehicle_preparing import (
     free_scale,
     frozen_paths,
     in_units,
-    mean_over_records,
     per_record_paths,
     vehicle_test,
     without,
 )
 from jaxdamp.identify.vehicle_residuals import Drive
 from jaxdamp.identify.vehicle_result import ChannelScore, VehicleFit, channel_scores
-from jaxdamp.parameters import free_parameters, get, matched_in_words, parameters, with_values
+from jaxdamp.parameters import free_parameters, matched_in_words, parameters
 from jaxdamp.rig import Sensor
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -119,12 +117,13 @@ def fit_vehicle(
     machine = started_machine(rig, [run for runs in benches.values() for run in runs])
     model = vehicle_test(vehicle, rides, sensors or {}, start, machine)
     varied = per_record_paths(model, per_record, len(rides))
-    spread = with_values(model, {path: jnp.full(len(rides), get(model, path)) for path in varied})
     named = own_names(model)
     limits, ties = named.find_keys("bounds", bounds), named.find_keys("tie", settings["tie"])
-    free = free_parameters(spread, freeze=frozen_paths(model, over, freeze), bounds=limits, tie=ties)
+    free = free_parameters(
+        spread(model, varied, len(rides)), freeze=frozen_paths(model, over, freeze), bounds=limits, tie=ties
+    )
     _checks.finite("vehicle", free.values)
-    expected, dt = priors_on(free, named.find_keys("priors", priors), 1.0), settings["dt"]
+    expected, dt = priors_on(free, named.find_keys("priors", priors)), settings["dt"]
     drives, per_cycle = drives_of(vehicle, rides, dt), settings["samples_per_cycle"]
     data = VehicleData(model, rides, drives, benches, float(settling), varied, per_cycle, dt, expected)
     data = data.with_known_noise(noise or {})
@@ -184,7 +183,7 @@ def _accepted(
 
     def drives_at(values: np.ndarray) -> list[Drive] | None:
         """How the records are simulated with these numbers; None where `simulate` would refuse."""
-        vehicle = mean_over_records(problem.free.started_at(values).tree, data.per_record).vehicle
+        vehicle = with_means(problem.free.started_at(values).tree, data.per_record).vehicle
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             try:
@@ -233,7 +232,7 @@ def _judged(
     model, held = problem.free.tree, (scale.held_name,) if scale.held_name else ()
     noise = _noise(problem, end)
     estimates = estimate(problem, solution, noise)
-    model = mean_over_records(model, data.per_record)
+    model = with_means(model, data.per_record)
     scores = channel_scores(problem, end.residual, data.rides)
     signs = [*on_signs(scores, at_start), *on_units(at_start, model.sensors)]
     notes = [*on_status(end, estimates.unsettled), *refused, *on_free_scale(scale, model), *signs, *estimates.notes]

@@ -24,19 +24,12 @@ GIVE = 3e-4  # m, that friction gives before it slides, as start
 
 
 class Place(NamedTuple):
-    """Where a vehicle may have friction.
+    """Where a vehicle may have friction."""
 
-    Attributes:
-        path: of the law there.
-        beside: the law without its friction; None if it has nothing else.
-        friction: what it has of friction; None if it has none.
-        force: sliding friction [N] to start from.
-    """
-
-    path: str
-    beside: AbstractDamper | None
-    friction: AbstractDamper | None
-    force: float  # N
+    path: str  # of the law there
+    beside: AbstractDamper | None  # the law without its friction, if it has something else
+    friction: AbstractDamper | None  # what it has of friction
+    force: float  # sliding friction [N] to start from
 
     @property
     def could_give(self) -> bool:
@@ -46,9 +39,7 @@ class Place(NamedTuple):
     def with_form(self, form: str, give: float | None = None) -> AbstractDamper | None:
         """The law with this form of friction.
 
-        Arguments:
-            form: of `FORMS`.
-            give: that the friction gives before it slides [m]; what it has, or 0.3 mm, if left out.
+        The friction gives so much before it slides [m]; what it has, or 0.3 mm, if left out.
         """
         if form == "none":
             return self.beside
@@ -65,9 +56,6 @@ def friction_places(vehicle: AbstractVehicle) -> list[Place]:
     """Where a vehicle has friction: its guides, suspensions, the sum of a damper with friction.
 
     Without any it may have friction in guides that have no law, or, without such guides, beside each of its dampers.
-
-    Arguments:
-        vehicle: any vehicle.
 
     >>> from jaxdamp.dampers import Linear
     >>> from jaxdamp.vehicles import Guide, Guided, QuarterCar

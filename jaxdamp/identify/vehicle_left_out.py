@@ -58,9 +58,7 @@ def on_signs(scores: Sequence[ChannelScore], at_start: Sequence[ChannelScore]) -
 def on_units(at_start: Sequence[ChannelScore], known: Mapping[str, Sensor]) -> list[str]:
     """A sentence on each channel that is like that of the vehicle of the start, but several times as large or small.
 
-    Arguments:
-        at_start: scores of the vehicle that the fit started from.
-        known: the sensors, of which those with a gain of their own may have any.
+    Not on those whose sensor has a gain of its own.
     """
     return [
         f"{score.channel} of {score.record} is {score.size:.2g} times what the vehicle of the start shows: its unit, or"
@@ -96,13 +94,6 @@ def on_sensors(
 
     The residual is regressed on what each sensor could add to first order (the slope of its channel, a constant, the
     channel itself), after both are freed of what the fitted numbers can explain.
-
-    Arguments:
-        problem: the problem that was solved.
-        end: its minimum.
-        records: the records.
-        channels: all channels in the order of `problem.sigma`.
-        sensors: the fitted sensors.
     """
     effects, columns = [], []
     for channel in channels:
@@ -130,14 +121,12 @@ def _column(
     problem: Problem, end: SearchEnd, records: Sequence[RideRecord], channel: str, effect: str
 ) -> Float[np.ndarray, " samples"] | None:
     """Change of the weighted residual for each unit of an effect; None for a law on a bench."""
-    parts, begin, found = [], 0, False
-    for part in problem.residuals:
-        size = part.used().size
-        column = np.zeros(size)
+    columns, found = np.zeros_like(end.residual), False
+    for (part, column), (_, residual) in zip(problem.by_part(columns), problem.by_part(end.residual), strict=True):
         if isinstance(part, RideBatch) and channel in part.channels:
             weight = np.asarray(part.weight)
             row, shaped, found = part.channels.index(channel), column.reshape(weight.shape), True
-            errors = end.residual[begin : begin + size].reshape(weight.shape)
+            errors = residual.reshape(weight.shape)
             for i, number in enumerate(np.asarray(part.number)):
                 counts = weight[i, row] > 0
                 error = np.divide(errors[i, row], weight[i, row], out=np.zeros(counts.size), where=counts)
@@ -145,9 +134,7 @@ def _column(
                 slope = np.gradient(expected, records[number].dt)
                 by_effect = {"delay": slope, "offset": -np.ones_like(slope), "gain": -expected}
                 shaped[i, row] = weight[i, row] * by_effect[effect]
-        parts.append(column)
-        begin += size
-    return np.concatenate(parts) if found else None
+    return columns if found else None
 
 
 def _sentence(channel: str, effect: str, size: float, unit: str) -> str:

@@ -20,7 +20,7 @@ from jaxdamp.identify.preparing import not_chosen
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.vehicle_residuals import Drive, bench_parts, driven, finer_heights, ride_batches
-from jaxdamp.parameters import FreeParameters, get, interval, match_paths, parameters, with_values
+from jaxdamp.parameters import FreeParameters, get, interval, match_paths, parameters
 from jaxdamp.rig import Rig, Sensor
 from jaxdamp.simulation import Exponential, RunCheck
 from jaxdamp.vehicles import AbstractVehicle, refuse_controller
@@ -208,21 +208,15 @@ def drives_of(vehicle: AbstractVehicle, rides: Sequence[RideRecord], dt: float |
     return drives
 
 
-def mean_over_records(model: VehicleTest, paths: Sequence[str]) -> VehicleTest:
-    """The model with the mean of each parameter that has a value for each record."""
-    return with_values(model, {path: jnp.mean(get(model, path)) for path in paths})
-
-
 def first_refused(
     free: FreeParameters,
     start: Float[np.ndarray, " free"],
     end: Float[np.ndarray, " free"],
     accepted: Callable[[Float[np.ndarray, " free"]], bool],
 ) -> tuple[int, float, FreeParameters] | None:
-    """The number by which the end of a search is refused; None if no single number makes the difference.
+    """The number by which the end of a search is refused, its last accepted value, and the free parameters within it.
 
-    Returns:
-        Its index, its last accepted value, and the free parameters with this value as limit.
+    None if no single number makes the difference.
     """
     for index, p in enumerate(free.owners):
         moved = end.copy()

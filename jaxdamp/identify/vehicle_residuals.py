@@ -16,7 +16,7 @@ from jaxdamp._settings import part, with_defaults
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.model import VehicleTest, on_rig
-from jaxdamp.identify.problem import AbstractResiduals
+from jaxdamp.identify.problem import AbstractResiduals, AbstractWeighted
 from jaxdamp.identify.traces import Batch, batches, owners
 from jaxdamp.parameters import get, with_values
 from jaxdamp.rig import Sensor
@@ -26,7 +26,7 @@ from jaxdamp.vehicles import AbstractVehicle, ForceDriven, prefixed
 
 
 @final
-class RideBatch(AbstractResiduals):
+class RideBatch(AbstractWeighted):
     """Records of equal length, sampling rate and channels, driven side by side.
 
     Samples are in the order of records, channels, time.
@@ -89,18 +89,6 @@ class RideBatch(AbstractResiduals):
         """Weighted difference between model and measurement."""
         return self.compared(model, self.observed(model))
 
-    def reweighted(self, factor: Float[np.ndarray, " samples"]) -> "RideBatch":
-        """The same with every weight times a factor."""
-        return dataclasses.replace(self, weight=self.weight * jnp.asarray(factor.reshape(self.weight.shape)))
-
-    def used(self) -> Bool[np.ndarray, " samples"]:
-        """Which samples count."""
-        return np.ravel(np.asarray(self.weight)) > 0
-
-    def total_weight(self) -> Float[Array, ""]:
-        """Sum of the squared weights."""
-        return jnp.sum(jnp.square(self.weight))
-
 
 @final
 class DamperOnBench(AbstractResiduals):
@@ -120,10 +108,6 @@ class DamperOnBench(AbstractResiduals):
     def used(self) -> Bool[np.ndarray, " samples"]:
         """Which samples count."""
         return self.batch.used()
-
-    def total_weight(self) -> Float[Array, ""]:
-        """Sum of the squared weights."""
-        return self.batch.total_weight()
 
 
 def driven(vehicle: AbstractVehicle, by_forces: bool) -> AbstractVehicle:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._results import Derived, drawn_by
@@ -102,15 +102,12 @@ class VehicleFit(Fit):
         Raises:
             ValueError: a channel that the vehicle does not have, or of another unit; a road of other wheels.
         """
-        for part in (part for part in self.problem.residuals if isinstance(part, RideBatch)):
-            for row, number in enumerate(np.asarray(part.number)):
-                if self.records[number].fingerprint == record.fingerprint:
-                    return dict(
-                        zip(part.channels, np.asarray(predicted(part, self.problem.free.tree))[row], strict=True)
-                    )
+        fitted = [own.fingerprint for own in self.records]
+        if record.fingerprint in fitted:
+            return fitted_channels(self.problem, self.problem.free.tree, fitted.index(record.fingerprint))[0]
         rides = checked_records(self.vehicle, record)
-        steps = [part.dt for part in self.problem.residuals if isinstance(part, RideBatch)]
-        (part,) = ride_batches(rides, drives_of(self.vehicle, rides, max(steps)), dict.fromkeys(record.channels, 1.0))
+        longest = max(part.dt for part in _driven(self.problem))
+        (part,) = ride_batches(rides, drives_of(self.vehicle, rides, longest), dict.fromkeys(record.channels, 1.0))
         shown = np.asarray(predicted(part, VehicleTest(self.vehicle, self.sensors)))[0]
         return dict(zip(part.channels, shown, strict=True))
 
@@ -121,19 +118,19 @@ class VehicleFit(Fit):
             records: as in `respond`.
         """
         rides = (records,) if isinstance(records, RideRecord) else tuple(records)
-        scores, units = [], self.vehicle.units
+        scores = []
         for ride in rides:
             begin = int(np.ceil(self.settling / ride.dt))
             for channel, values in self.respond(ride).items():
                 measured = ride[channel][begin:]
-                errors = figures(measured, values[begin:] - measured)
-                scores.append(ChannelScore(ride.name, channel, units[channel], *errors))
+                unit = self.vehicle.units[channel]
+                scores.append(channel_score(ride.name, channel, unit, measured, values[begin:] - measured))
         return tuple(scores)
 
     @property
     def settling(self) -> float:
         """Time at the beginning of each record that was not compared [s]."""
-        part = next(part for part in self.problem.residuals if isinstance(part, RideBatch))
+        part = _driven(self.problem)[0]
         return int(np.argmax(np.asarray(part.weight)[0, 0] > 0)) * part.dt * part.finer
 
     def predict(self) -> dict[str, dict[str, Float[np.ndarray, " time"]]]:
@@ -161,9 +158,7 @@ class VehicleFit(Fit):
 
     def scores_table(self) -> Table:
         """The errors of each channel of each record."""
-        columns = [Column("record"), Column("channel"), Column("unit"), Column("RMSE", spec=".3g")]
-        columns += [Column("fit", "%", ".1f"), Column("largest error", spec=".3g")]
-        return Table("Channels", tuple(columns), tuple(tuple(score)[: len(columns)] for score in self.scores))
+        return table_of_scores("Channels", "record", self.scores)
 
     def parameters_table(self) -> Table:
         """`table()`."""
@@ -202,19 +197,31 @@ def predicted(batch: RideBatch, model: VehicleTest) -> Array:
     return batch.predict(model)
 
 
+def _driven(problem: Problem) -> list[RideBatch]:
+    """The drives of the fit, in batches."""
+    return [part for part in problem.residuals if isinstance(part, RideBatch)]
+
+
+def fitted_channels(
+    problem: Problem, model: VehicleTest, number: int
+) -> tuple[dict[str, Float[np.ndarray, " time"]], Bool[np.ndarray, " time"]]:
+    """The channels of a fitted drive with this model, and which samples were compared."""
+    ((part, row),) = [(b, int(at)) for b in _driven(problem) for at in np.flatnonzero(np.asarray(b.number) == number)]
+    values = np.asarray(predicted(part, model))[row]
+    return dict(zip(part.channels, values, strict=True)), np.asarray(part.weight)[row, 0] > 0
+
+
 def channel_scores(
     problem: Problem, residual: Float[np.ndarray, " samples"], records: Sequence[RideRecord]
 ) -> tuple[ChannelScore, ...]:
     """Errors of each channel of each record over the samples that are compared."""
-    scores, end, units = {}, 0, problem.law.units
+    scores, units = {}, problem.law.units
     forces: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
-    for part in problem.residuals:
+    for part, missed in problem.by_part(residual):
         if not isinstance(part, RideBatch | DamperOnBench):
-            end += part.used().size
             continue
         weight = np.asarray(part.weight if isinstance(part, RideBatch) else part.batch.weight)
-        begin, end = end, end + weight.size
-        used, errors = weight > 0, residual[begin:end].reshape(weight.shape)
+        used, errors = weight > 0, missed.reshape(weight.shape)
         if isinstance(part, DamperOnBench):
             pair = np.asarray(part.batch.force)[used], errors[used] / weight[used]
             forces.setdefault(part.path, []).append(pair)
@@ -223,19 +230,27 @@ def channel_scores(
             for k, channel in enumerate(part.channels):
                 chosen = used[i, k]
                 error = errors[i, k][chosen] / weight[i, k][chosen]
-                sizes = figures(records[number][channel][chosen], error)
-                scores[number, k] = ChannelScore(records[number].name, channel, units[channel], *sizes)
+                record, unit = records[number], units[channel]
+                scores[number, k] = channel_score(record.name, channel, unit, record[channel][chosen], error)
     on_bench = [
-        ChannelScore("bench", f"{path} force", "N", *figures(*map(np.concatenate, zip(*pairs, strict=True))))
+        channel_score("bench", f"{path} force", "N", *map(np.concatenate, zip(*pairs, strict=True)))
         for path, pairs in forces.items()
     ]
     return (*[scores[key] for key in sorted(scores)], *on_bench)
 
 
-def figures(measured: np.ndarray, error: np.ndarray) -> tuple[float, float, float, float, float]:
-    """RMSE, fit percent, largest error, correlation and ratio of measured and predicted values."""
+def channel_score(record: str, channel: str, unit: str, measured: np.ndarray, error: np.ndarray) -> ChannelScore:
+    """How well a channel is predicted, by its measured values and the errors of the predicted ones."""
     percent = fit_percent([measured], [measured + error])
     spread, predicted = float(np.std(measured)), float(np.std(measured + error))
     product = np.mean((measured - measured.mean()) * (measured + error))
     alike, size = (float(product / (spread * predicted)), spread / predicted) if spread * predicted > 0 else (0.0, 1.0)
-    return float(np.sqrt(np.mean(error**2))), percent, float(np.abs(error).max()), alike, size
+    rmse, largest = float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
+    return ChannelScore(record, channel, unit, rmse, percent, largest, alike, size)
+
+
+def table_of_scores(title: str, first: str, scores: Iterable[ChannelScore]) -> Table:
+    """The errors of channels; the first column, of the records, has this name."""
+    columns = [Column(first), Column("channel"), Column("unit"), Column("RMSE", spec=".3g")]
+    columns += [Column("fit", "%", ".1f"), Column("largest error", spec=".3g")]
+    return Table(title, tuple(columns), tuple(tuple(score)[: len(columns)] for score in scores))

@@ -193,22 +193,18 @@ class SequentialQuadratic:
         """
         import scipy.optimize  # noqa: F401 - before its linear algebra is limited
 
-        with one_thread():
-            return self._step(evaluate, states)
-
-    def _step(self, evaluate: Evaluate, states: Sequence[SearchState]) -> bool:
         tried = []
-        for state in states:
-            if state.open:
+        with one_thread():
+            for state in (state for state in states if state.open):
                 step, promised = self._best_step(state)
                 while promised < self.improvement and self._raised_penalty(state):
                     step, promised = self._best_step(state)
                 if not self.terminate(state, promised):
                     tried.append((state, state.y + step, promised))
-        if tried:
-            evaluations = evaluate(np.stack([y for _, y, _ in tried]))
-            for (state, y, promised), evaluation in zip(tried, evaluations, strict=True):
-                self._move(state, y, evaluation, promised)
+            if tried:
+                evaluations = evaluate(np.stack([y for _, y, _ in tried]))
+                for (state, y, promised), evaluation in zip(tried, evaluations, strict=True):
+                    self._move(state, y, evaluation, promised)
         return bool(tried)
 
     def terminate(self, state: SearchState, promised: float) -> bool:

@@ -1,5 +1,6 @@
 """The page of a law: written for every law, and driven in a browser, where its numbers are those of the library."""
 
+import dataclasses
 import itertools
 import json
 import re
@@ -213,6 +214,30 @@ def test_units_and_sign_of_a_shop(tmp_path, browser):
     units = browser.evaluate("[...document.querySelectorAll('#metrics .unit')].map((cell) => cell.textContent)")
     assert {"in", "lbf", "m/s²"} <= set(units)
     assert "positive in compression" in browser.evaluate("document.body.textContent")
+    assert not browser.troubles()
+
+
+@pytest.mark.slow
+def test_records_are_compared_where_the_page_follows_what_they_state(tmp_path, browser):
+    """A held command drives law and baseline; of what only a fit follows the page draws the record alone."""
+    law = Scheduled((VALVE, Besinger(1800.0, 5600.0, 1400.0, 0.25, 0.05)), [0.0, 1.0], 0.25)
+    held = dataclasses.replace(record(with_command(law, 0.8)), command=0.8)
+    stated = dataclasses.replace(held, settings={"rebound_rate": "2500 N s/m", "series": "A"})
+    commands = {"command": None, "command_channel": np.linspace(0.0, 1.0, len(held)), "command_unit": "A"}
+    runs = [held, stated, dataclasses.replace(held, **commands)]
+    with shown_in(Display(sign="compression-positive")):
+        page(law, tmp_path, browser, records=runs, duration=1.0)
+    fits = browser.evaluate("[state.fits.law.rmse, state.fits.baseline.rmse]")
+    np.testing.assert_allclose(fits, 5.0 / 2**0.5, rtol=0.02)
+    beyond = ["", "the rebound rate", "the varying command"]
+    assert browser.evaluate("DATA.records.map((record) => record.beyond)") == beyond
+    browser.choose("#motion", "2")
+    assert "does not follow the varying command" in browser.evaluate("get('fitNote').textContent")
+    assert browser.evaluate("[state.loops.length, Object.keys(state.fits).length]") == [1, 0]
+    row = "document.querySelector('tr[data-metric=working_space_mean] [data-value]')"
+    mean, shown = browser.evaluate(f"[Number({row}.dataset.value), {row}.textContent]")
+    assert mean != 0.0 and float(shown.replace("\u2212", "-")) * mean < 0.0
+    assert browser.evaluate("charts.spectrum.series[0].y.some((y) => y > 0)")
     assert not browser.troubles()
 
 

@@ -146,9 +146,9 @@ def test_all_certain_numbers_are_moved_away(monkeypatch):
     runs = VirtualDyno(law, sampling_rate=400.0, force_noise=10.0, seed=2).run(tests)
     plain, moved, certain = profile.Searches.end, set(), []
 
-    def end(searches, values, max_steps, *, held=None, solver=None):
+    def end(searches, values, max_steps, *, held=None):
         moved.update(() if held is None else [held])
-        return plain(searches, values, max_steps, held=held, solver=solver)
+        return plain(searches, values, max_steps, held=held)
 
     def profiled(problem, found, errors, far, chosen, variance):
         certain.extend(np.flatnonzero(chosen & (errors > 0)))

@@ -2,7 +2,7 @@
 
 const DATA = JSON.parse(document.getElementById("data").textContent);
 const get = (id) => document.getElementById(id);
-const SEGMENT = 2048, CURVES = ["curve0", "curve1", "curve2", "curve3"], CHECK_AFTER = 400, TOLERANCE = 0.01, MOST_SUBSTEPS = 64;
+const SEGMENT = Math.min(2048, 2 ** Math.floor(Math.log2(DATA.count))), CURVES = ["curve0", "curve1", "curve2", "curve3"], CHECK_AFTER = 400, TOLERANCE = 0.01, MOST_SUBSTEPS = 64;
 const EVERY = Math.max(1, Math.round(0.01 / DATA.dt));  // of the instants of a run are shown in motion
 
 const cached = new Map();  // loops of the baseline, which no slider moves
@@ -175,16 +175,17 @@ function showLoops() {
   if (isRecord) {
     const record = chosen === "dropped" ? state.dropped : records[Number(chosen)];
     drawn.push({ points: true, colour: "measured", alpha: 0.6, loop: record });
-    if (!record.dt && (DATA.law.states || DATA.baseline.states))
-      throw new Error(`${record.name} has no time column, without which a law with states cannot follow it: only the measured loop is shown.`);
-    for (const side of ["baseline", "law"]) {
-      const more = side === "law" && DATA.law.command && record.command !== null && record.command !== undefined ? { [DATA.law.command]: record.command } : {};
+    const untimed = !record.dt && (DATA.law.states || DATA.baseline.states);
+    if (untimed) note = `${record.name} has no time column, without which a law with states cannot follow it: only the measured loop is shown.`;
+    else if (record.beyond) note = `Only the measured loop is shown: the page does not follow ${record.beyond} of ${record.name}.`;
+    for (const side of note ? [] : ["baseline", "law"]) {
+      const command = DATA[side].command, more = command && record.command !== null && record.command !== undefined ? { [command]: record.command } : {};
       const first = firstCounted(record, sides[side].states), result = loop(side, chosen, { ...record, first: 0 }, more);
       fits[side] = misfit(record.force, result.all, first);
       const counted = Object.fromEntries(["x", "v", "force"].map((key) => [key, result[key].subarray(first)]));
       drawn.push({ colour: side === "law" ? "law" : "baseline", width: side === "law" ? 1.8 : 1.3, dash: side === "law" ? [] : [5, 4], loop: counted });
     }
-    note = `${record.note}${sides.law.states ? "; the first cycle, in which the states settle, does not count" : ""}.`;
+    note ||= `${record.note}${sides.law.states ? "; the first cycle, in which the states settle, does not count" : ""}.`;
   } else {
     const amplitude = positive("amplitude") / 1000;
     frequencies().forEach((frequency, k) => {
@@ -225,10 +226,11 @@ function showMetrics() {
   const [law, baseline] = ["law", "baseline"].map((side) => state.results[side].metrics);
   const row = (metric, k) => {
     const change = 100 * (law[k] / baseline[k] - 1), plain = metric.signed || !Number.isFinite(change), { unit, scale } = metric.unit ? drawnIn(metric.unit) : { unit: "", scale: 1 };
+    const shown = (metric.turned ? -1 : 1) * scale;
     const text = plain ? "" : `${change > 0 ? "+" : ""}${Math.abs(change) < 0.005 ? "0" : readable(change, 3)} %`;
     return element("tr", { "data-metric": metric.name },
-      element("th", {}, metric.title), element("td", { "data-value": String(law[k]) }, readable(scale * law[k])),
-      element("td", { "data-value": String(baseline[k]) }, readable(scale * baseline[k])),
+      element("th", {}, metric.title), element("td", { "data-value": String(law[k]) }, readable(shown * law[k])),
+      element("td", { "data-value": String(baseline[k]) }, readable(shown * baseline[k])),
       element("td", { class: "change" }, text), element("td", { class: "unit" }, unit));
   };
   const rows = DATA.metrics.map(row);
