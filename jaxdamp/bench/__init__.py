@@ -23,28 +23,16 @@ from jaxdamp.bench.contradictions import (
     pairs_in_words as pairs_in_words,
 )
 from jaxdamp.bench.damper_records import DamperRecords, read_dampers
-from jaxdamp.bench.evaluation import (
-    OEM_VELOCITIES as OEM_VELOCITIES,
-    Evaluation as Evaluation,
-    GasAndFriction as GasAndFriction,
-    Limit,
-    LimitCheck as LimitCheck,
-    Measurement as Measurement,
-    evaluate,
-    read_limits,
-    separate_gas_and_friction,
-)
+from jaxdamp.bench.evaluation.curve import OEM_VELOCITIES as OEM_VELOCITIES, Measurement as Measurement
+from jaxdamp.bench.evaluation.evaluate import evaluate
+from jaxdamp.bench.evaluation.limits import Limit, LimitCheck as LimitCheck, read_limits
+from jaxdamp.bench.evaluation.result import Evaluation as Evaluation
+from jaxdamp.bench.evaluation.separation import GasAndFriction as GasAndFriction, separate_gas_and_friction
 from jaxdamp.bench.force_velocity import ForceVelocityTable as ForceVelocityTable, are_tables as are_tables, read_table
 from jaxdamp.bench.kinematics import Kinematics as Kinematics, read_kinematics
 from jaxdamp.bench.motion import white_noise as white_noise
-from jaxdamp.bench.preflight import (
-    Finding as Finding,
-    Preflight as Preflight,
-    clock_jitter as clock_jitter,
-    mains_lines as mains_lines,
-    preflight,
-    usable as usable,
-)
+from jaxdamp.bench.preflight.check import Preflight as Preflight, preflight, usable as usable
+from jaxdamp.bench.preflight.finding import Finding as Finding, clock_jitter as clock_jitter, mains_lines as mains_lines
 from jaxdamp.bench.processing import Steps, low_pass_gain
 from jaxdamp.bench.programmes import Excitation as Excitation, RandomTest, SineTest
 from jaxdamp.bench.raw import RawColumn, RawTable

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -115,7 +114,7 @@ def _values(table: RawTable, raw: RawColumn, column: Column) -> tuple[Samples, s
         return stamps.seconds(values, where, table.place)
     values = column.conversion(np.ascontiguousarray(values))
     try:
-        clock.check_numbers(values, f"{column.role} (column {column.header!r})", table.where, table.lines)
+        clock.check_numbers(values, f"{column.role} (column {column.header!r})", table.where, table.place)
     except ValueError as error:
         raise ArgumentError(f"{error} Or pass {drop}.", drop) from error
     return values, ""
@@ -133,13 +132,13 @@ def _parts(table: RawTable, time: Samples | None, motion: Samples, rate: float |
     where = table.where
     if time is None:
         return [_from_rate(len(table), rate, where)]
-    parts = regular_parts(time, where, table.lines)
+    parts = regular_parts(time, where, table.place)
     _check_rate(parts, rate, where)
     if len(parts) == 1:
         return parts
     good = [part for part in parts if _has_cycle(part, motion)]
     if not good:
-        clock.refuse_gaps(time, clock.gaps(time), where, table.lines)
+        clock.refuse_gaps(time, clock.gaps(time), where, table.place)
     left_out = [part for part in parts if part not in good]
     samples = sum(len(part.time) for part in left_out)
     plural = "s" if len(left_out) > 1 else ""
@@ -207,24 +206,24 @@ def _record(
         velocity, source = _velocity(time, stroke, velocity, where)
     temperature = channels.get("temperature")
     stated = _stated(table) if states_all else {}
-    commanded = _commanded(columns, channels, part, stated.get("command"))
+    held, varying, unit, said = _commanded(columns, channels, part, stated.get("command"))
     return BenchRun(
         name,
         time,
-        _turned(stroke, decision.motion),
-        _turned(velocity, decision.motion),
-        _turned(force, decision.force),
+        decision.motion * stroke,
+        decision.motion * velocity,
+        decision.force * force,
         temperature=None if temperature is None else part.of(temperature),
-        command=commanded.held,
-        command_channel=commanded.channel,
-        command_unit=commanded.unit,
+        command=held,
+        command_channel=varying,
+        command_unit=unit,
         settings=stated.get("settings", {}),
         source=str(table.file),
         notes=(
             *stated.get("notes", ()),
             *notes,
             *part.notes,
-            *commanded.notes,
+            *said,
             *decision.notes,
             source or "velocity as the file states",
         ),
@@ -233,26 +232,17 @@ def _record(
     )
 
 
-class _Commanded(NamedTuple):
-    """The command of a record: held, or a channel with its unit; and a note where a column shows that it is held."""
-
-    held: float | None
-    channel: Samples | None = None
-    unit: str = ""
-    notes: tuple[str, ...] = ()
-
-
 def _commanded(
     columns: Mapping[str, Column], channels: Mapping[str, Samples], part: Part, stated: float | None
-) -> _Commanded:
-    """The command of a record, by its column if it has one."""
+) -> tuple[float | None, Samples | None, str, list[str]]:
+    """The command that is held, or else its channel and unit; and a note where a column shows that it is held."""
     conversion = columns["command"].conversion if "command" in channels else None
     if conversion is None:
-        return _Commanded(stated)
+        return stated, None, "", []
     values = part.of(channels["command"])
     if np.ptp(values) > 0.0:
-        return _Commanded(None, values, conversion.si)
-    return _Commanded(float(values[0]), notes=(f"command held at {values[0]:g} {conversion.si}, by its column",))
+        return None, values, conversion.si, []
+    return float(values[0]), None, "", [f"command held at {values[0]:g} {conversion.si}, by its column"]
 
 
 def _refuse_signs(how: Interpretation, where: str) -> None:
@@ -277,10 +267,6 @@ def _stated(table: RawTable) -> dict:
         "notes": after[NOTE_MARK],
         "stroke_is_integrated": any(line.strip() == INTEGRATED_MARK for line in table.preamble),
     }
-
-
-def _turned(values: Samples, factor: float) -> Samples:
-    return values if factor == 1.0 else values * factor
 
 
 def _velocity(time: Samples, stroke: Samples, measured: Samples | None, where: str) -> tuple[Samples, str]:

@@ -32,15 +32,8 @@ class Block(NamedTuple):
 def blocks_of(cells: Cells, count: int, header: int, first: int, like: Sequence[int], layout: Layout) -> list[Block]:
     """The blocks of some lines or rows: one, or one under each that is like the header.
 
-    The numbers below each header must begin again: a header inside one record is a fault of the file.
-
-    Arguments:
-        cells: of the row of a number.
-        count: number of rows.
-        header: number of the row of the header.
-        first: number of the first row of numbers; that of the header if there is none.
-        like: numbers of all rows like the header.
-        layout: of the rows of numbers.
+    The numbers below each header must begin again: a header inside one record is a fault of the file. The first row of
+    numbers is that of the header if there is none.
     """
     depth = first - header
     ends = [_end(cells, start + depth, stop - 1, layout) for start, stop in pairwise([*like, count + 1])]

@@ -2,7 +2,7 @@
 
 import hashlib
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NoReturn
 
@@ -14,6 +14,8 @@ from jaxdamp._checks import ArgumentError, Setting
 from jaxdamp.bench.motion import Samples
 
 
+Place = Callable[[int], str]  # where a sample stands, for messages
+IN_ARRAYS: Place = "sample {}".format
 FEWEST = 20  # samples of a record
 _MEASURED = "A record is measured: keep it out of the arguments of `jax.jit`, and trace the law (`jaxdamp.respond`)."
 _GAP = 1.5  # sampling steps that are taken for a gap
@@ -45,13 +47,7 @@ def digest(*channels: np.ndarray) -> bytes:
 
 
 def check_time(time: Samples, where: str) -> tuple[Samples, str]:
-    """The instants of a uniformly sampled record, and a sentence if they had to be made uniform.
-
-    Instants that were only rounded when they were written (three decimals at 300 Hz) are put back on the uniform grid.
-
-    Raises:
-        ValueError: time goes back or stands still, samples are missing, or the steps are not uniform.
-    """
+    """The instants of a uniformly sampled record, and a sentence if they had to be put back on the uniform grid."""
     check_order(time, where)
     if is_uniform(time):
         return time, ""
@@ -68,19 +64,20 @@ def check_time(time: Samples, where: str) -> tuple[Samples, str]:
     )
 
 
-def check_order(time: Samples, where: str, lines: Sequence[int] | None = None) -> None:
+def check_order(time: Samples, where: str, place: Place = IN_ARRAYS) -> None:
     """Refuse a time that goes back or stands still, naming where."""
     back = np.flatnonzero(np.diff(time) <= 0)
     if back.size:
         i = int(back[0]) + 1
-        without, rate = Setting("columns", {"time": None}), Setting("sampling_rate")
-        raise ArgumentError(
-            f"{where}, {_place(i, lines)}: time goes from {time[i - 1]:.9g} s to {time[i]:.9g} s, but must increase. "
-            f"Cut the record there; or, if its clock is too coarse, leave its column out and give the rate: "
-            f"{without}, {rate}.",
-            without,
-            rate,
-        )
+        moves = f"time goes from {time[i - 1]:.9g} s to {time[i]:.9g} s, but must increase"
+        _refuse_clock(f"{where}, {place(i)}: {moves}. Cut the record there")
+
+
+def _refuse_clock(said: str) -> NoReturn:
+    """Refuse a time with a sentence on what may also be wrong."""
+    without, rate = Setting("columns", {"time": None}), Setting("sampling_rate")
+    remedy = f"or, if its clock is too coarse, leave its column out and give the rate: {without}, {rate}."
+    raise ArgumentError(f"{said}; {remedy}", without, rate)
 
 
 def is_uniform(time: Samples) -> bool:
@@ -101,25 +98,22 @@ def gaps(time: Samples) -> np.ndarray:
     return np.flatnonzero(wide)
 
 
-def refuse_gaps(time: Samples, missing: np.ndarray, where: str, lines: Sequence[int] | None = None) -> NoReturn:
+def refuse_gaps(time: Samples, missing: np.ndarray, where: str, place: Place = IN_ARRAYS) -> NoReturn:
     """Refuse a record with samples missing behind these."""
     i, steps = int(missing[0]) + 1, np.diff(time)
     usual = float(np.median(steps))
-    without, rate = Setting("columns", {"time": None}), Setting("sampling_rate")
-    raise ArgumentError(
-        f"{where}, {_place(i, lines)}: {steps[i - 1] / usual - 1:.0f} samples are missing between {time[i - 1]:.6g} "
+    _refuse_clock(
+        f"{where}, {place(i)}: {steps[i - 1] / usual - 1:.0f} samples are missing between {time[i - 1]:.6g} "
         f"and {time[i]:.6g} s ({missing.size} such gaps in all; the usual step is {usual:.4g} s). Cut the record "
-        f"into the parts before and after the gap; or, if its clock is too coarse, leave its column out and give the "
-        f"rate: {without}, {rate}.",
-        without,
-        rate,
+        "into the parts before and after the gap"
     )
 
 
 def without_rounding(time: Samples) -> tuple[Samples, str] | None:
     """The uniform instants that were rounded when they were written (three decimals at 300 Hz), and a note."""
     step, off = _grid(time)
-    quantum = 10.0 ** -_decimals(time)
+    written = (digits for digits in range(9) if np.all(np.abs(np.round(time, digits) - time) < 1e-10))
+    quantum = 10.0 ** -next(written, 9)
     if off > 0.6 * quantum:
         return None
     note = f"time was rounded to {quantum:g} s in the file; it is put back on a grid of {1 / step:.6g} Hz"
@@ -133,29 +127,12 @@ def _grid(time: Samples) -> tuple[float, float]:
     return step, float(np.max(np.abs(time - time.mean() - step * number)))
 
 
-def _place(sample: int, lines: Sequence[int] | None) -> str:
-    """Where a sample stands: its line or, in a file without lines, its number from 1; in arrays its index."""
-    if lines is None:
-        return f"sample {sample}"
-    return f"line {lines[sample]}" if len(lines) else f"sample {sample + 1}"
-
-
-def _decimals(time: Samples) -> int:
-    """The number of decimals that writes all instants, at most 9."""
-    for digits in range(9):
-        if np.all(np.abs(np.round(time, digits) - time) < 1e-10):
-            return digits
-    return 9
-
-
-def check_numbers(
-    values: Float[np.ndarray, " time"], role: str, where: str, lines: Sequence[int] | None = None
-) -> None:
+def check_numbers(values: Float[np.ndarray, " time"], role: str, where: str, place: Place = IN_ARRAYS) -> None:
     """Refuse NaN and infinity, naming the first."""
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:
         raise ValueError(
-            f"{where}, {_place(int(bad[0]), lines)}: the {role} is {values[bad[0]]} ({bad.size} such values in all). "
+            f"{where}, {place(int(bad[0]))}: the {role} is {values[bad[0]]} ({bad.size} such values in all). "
             "Cut the record there or mend it."
         )
 
@@ -198,25 +175,16 @@ class Part:
         return np.interp(self.time, self.stored, values[self.samples]) if self.resample else values[self.samples]
 
 
-def regular_parts(time: Samples, where: str, lines: Sequence[int] | None = None) -> list[Part]:
-    """The stretches of a record between gaps in time, each on uniform instants.
-
-    Arguments:
-        time: instants as the file states them [s].
-        where: the file, for messages.
-        lines: number of the line of each sample.
-
-    Raises:
-        ValueError: time goes back or stands still, or there are more than 20 gaps.
-    """
+def regular_parts(time: Samples, where: str, place: Place = IN_ARRAYS) -> list[Part]:
+    """The stretches of a record between gaps in time, each on uniform instants."""
     notes: tuple[str, ...] = ()
     if abs(time[0]) > _EPOCH:
         notes = (f"time counts from the first sample, which the file puts at {time[0]:.3f} s",)
         time = time - time[0]
-    check_order(time, where, lines)
+    check_order(time, where, place)
     missing = gaps(time)
     if len(missing) >= _MOST_PARTS:
-        refuse_gaps(time, missing, where, lines)
+        refuse_gaps(time, missing, where, place)
     edges = [0, *(int(gap) + 1 for gap in missing), len(time)]
     parts = []
     for number, (start, stop) in enumerate(itertools.pairwise(edges), 1):

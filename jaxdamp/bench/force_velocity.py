@@ -1,7 +1,7 @@
 """Force-velocity tables, such as a manufacturer's sheet: points of one setting or of many, as laws and for fits."""
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Unpack, final
 
@@ -10,11 +10,11 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._files import FOLDER_SUFFIXES, find_files
 from jaxdamp._settings import with_defaults
-from jaxdamp._tables import Column as TableColumn, Contents, Table
+from jaxdamp._tables import Column as TableColumn, Table
 from jaxdamp._types import Figure
 from jaxdamp.bench import sign as signs
 from jaxdamp.bench.columns import Choice
-from jaxdamp.bench.manifest import BENCH_KEYS, TABLE_KEYS, Kinds, find_manifest, merged, read_manifest
+from jaxdamp.bench.manifest import BENCH_KEYS, TABLE_KEYS, Paths, with_manifest
 from jaxdamp.bench.raw import Problems
 from jaxdamp.bench.readers import FILES, READERS, Files, read_tables, with_own
 from jaxdamp.bench.runs import BenchRun
@@ -161,7 +161,7 @@ def _motion(curve: Curve, table: ForceVelocityTable) -> BenchRun:
 
 @with_defaults(FILES)
 def read_table(
-    paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+    paths: Paths,
     *,
     sign: str | None = None,
     side: str | None = None,
@@ -213,11 +213,11 @@ def read_table(
     if side is not None:
         _checks.one_of("side", side, SIDES)
     given = {"sign": sign, "columns": columns, "units": files["units"], "delimiter": files["delimiter"]}
-    given, notes = _stated(paths, manifest, given, TABLE_KEYS)
+    _, given, notes = with_manifest(paths, manifest, given, TABLE_KEYS)
     signs.check_words(given["sign"], None)
     choice = Choice({**(given["columns"] or {})}, {**(given["units"] or {})})
     sheets, readers = find_files(paths, {*FOLDER_SUFFIXES, *(files["readers"] or {})}), with_own(files["readers"])
-    sides, problems, how, stated = [], Problems(), How(choice, given["sign"], side), set()
+    notes, sides, problems, how, stated = [*notes], [], Problems(), How(choice, given["sign"], side), set()
     for file in sheets:
         with problems.collected():
             tables = [with_headers(table) for table in read_tables(file, readers, given["delimiter"])]
@@ -239,7 +239,7 @@ def read_table(
 
 
 def are_tables(
-    paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+    paths: Paths,
     *,
     columns: Mapping[str, str | int | None] | None = None,
     units: Mapping[str, str] | None = None,
@@ -257,7 +257,8 @@ def are_tables(
         sign: not needed to tell.
         manifest: as in `read_table`.
     """
-    given, _ = _stated(paths, manifest, {"columns": columns, "units": units, "delimiter": delimiter}, BENCH_KEYS)
+    given = {"columns": columns, "units": units, "delimiter": delimiter}
+    _, given, _ = with_manifest(paths, manifest, given, BENCH_KEYS)
     choice = Choice({**(given["columns"] or {})}, {**(given["units"] or {})})
     files = find_files(paths, FOLDER_SUFFIXES)
     if any(file.stat().st_size > _LARGEST for file in files):
@@ -267,17 +268,3 @@ def are_tables(
         return any(is_force_velocity(table, choice) for table in first)
     except (ValueError, OSError, ImportError):  # said by who reads them
         return False
-
-
-def _stated(
-    paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
-    manifest: str | os.PathLike[str] | bool,
-    given: Contents,
-    keys: Kinds,
-) -> tuple[Contents, list[str]]:
-    """What was given, with what a manifest says beside it, and a note on it."""
-    file = find_manifest(manifest, [paths] if isinstance(paths, str | os.PathLike) else list(paths))
-    if file is None:
-        return given, []
-    stated = {key: value for key, value in read_manifest(file, keys).items() if key in (*given, "show")}
-    return merged(stated, given), [f"read as the manifest {file} says"]

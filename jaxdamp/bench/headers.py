@@ -8,25 +8,12 @@ from jaxdamp.bench.units import SI, Conversion, conversion, ratio
 ROLES = tuple(SI)
 COMMAND_HEADER = "measured command"  # of a record that the library writes
 _WORDS = {
-    "time": ("time", "zeit", "elapsed", "clock", "timestamp", "datetime", "uhrzeit", "epoch", "t"),
-    "stroke": (
-        "stroke",
-        "displacement",
-        "disp",
-        "position",
-        "pos",
-        "travel",
-        "weg",
-        "hub",
-        "lvdt",
-        "extension",
-        "x",
-        "s",
-    ),
-    "velocity": ("velocity", "vel", "geschwindigkeit", "xdot", "speed", "v"),
-    "force": ("force", "load", "kraft", "frc", "loadcell", "f"),
-    "temperature": ("temperature", "temp", "temperatur", "thermocouple", "t"),
-    "command": (),  # see `_is_command`
+    "time": "time zeit elapsed clock timestamp datetime uhrzeit epoch t".split(),
+    "stroke": "stroke displacement disp position pos travel weg hub lvdt extension x s".split(),
+    "velocity": "velocity vel geschwindigkeit xdot speed v".split(),
+    "force": "force load kraft frc loadcell f".split(),
+    "temperature": "temperature temp temperatur thermocouple t".split(),
+    "command": [],  # see `_is_command`
 }
 _COMMANDS = {"current", "strom", "spulenstrom", "voltage", "spannung"}
 _OF_COMMANDS = {"coil", "valve", "damper", "mr", "solenoid", "measured", "actual", "ventil", "spule", "daempfer"}

@@ -107,13 +107,15 @@ def read_kinematics(
     travel, unit = in_si(table, at["wheel"], "stroke", choice)
     factor, said = _direction(table, table.names[at["wheel"]], sign)
     quantity = "damper" if "damper" in at else "ratio"
-    values, of_values = in_si(table, at["damper"], "stroke", choice) if "damper" in at else _ratios(table, at["ratio"])
+    values, of_values = (
+        in_si(table, at["damper"], "stroke", choice) if "damper" in at else (_ratios(table, at["ratio"]), "one")
+    )
     there = np.isfinite(travel) & np.isfinite(values)
     order = np.argsort(factor * travel[there])
     travel, values = (factor * travel[there])[order] + 0.0, values[there][order]  # no negative zero
     _check_points(table, travel)
     notes = [f"{role} from {table.names[index]!r}" for role, index in at.items()]
-    notes += [f"wheel travel in {unit}, {quantity} in {of_values or 'one'}; brought to SI", said, *table.notes]
+    notes += [f"wheel travel in {unit}, {quantity} in {of_values}; brought to SI", said, *table.notes]
     if not travel[0] <= 0.0 <= travel[-1]:
         notes.append("no point at both sides of zero wheel travel, which is the zero of the vehicle's stroke")
     ratio = values if quantity == "ratio" else _slopes(table, travel, values)
@@ -164,18 +166,13 @@ def _direction(table: RawTable, header: str, sign: str | None) -> tuple[float, s
     if sign is not None:
         return (-1.0 if sign == "compression-positive" else 1.0), f"wheel travel is {sign}, as it was said"
     if len(stated) != 1:
-        ways = Setting("sign", "rebound-positive"), Setting("sign", "compression-positive")
-        raise ArgumentError(
-            f"{table.where}, column {header!r}: positive wheel travel may be rebound or compression, and the header "
-            f"does not say which. Pass {ways[0]} or {ways[1]}.",
-            *ways,
-        )
+        signs.require(None, f"{table.where}, column {header!r}", "wheel travel", "header")
     (factor,) = stated
     return factor, f"wheel travel is {signs.SIGNS[int(factor < 0)]}, as its header says"
 
 
-def _ratios(table: RawTable, index: int) -> tuple[Points, str]:
-    """The column of ratios, and no unit."""
+def _ratios(table: RawTable, index: int) -> Points:
+    """The column of ratios, which have no unit."""
     column = table.columns[index]
     unit = column.unit or split_header(column.name)[1] or ""
     if unit not in _NO_UNITS:
@@ -183,7 +180,7 @@ def _ratios(table: RawTable, index: int) -> tuple[Points, str]:
         raise ValueError(
             f"{where}: a motion ratio is damper travel divided by wheel travel, without the unit {unit!r}."
         )
-    return numbers_of(table, index), ""
+    return numbers_of(table, index)
 
 
 def _check_points(table: RawTable, travel: Points) -> None:

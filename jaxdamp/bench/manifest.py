@@ -1,7 +1,7 @@
 """How to read the records of a folder, written beside them: `jaxdamp.toml`."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from jaxdamp import _checks
@@ -11,6 +11,7 @@ from jaxdamp._tables import Contents
 
 NAME = "jaxdamp.toml"
 TABLES = ("columns", "units", "gains")
+Paths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
 Kinds = Mapping[str, tuple[type, ...]]  # key of a manifest to what it may be
 BENCH_KEYS: Kinds = {
     "sign": (str,),
@@ -38,17 +39,46 @@ TABLE_KEYS: Kinds = {key: BENCH_KEYS[key] for key in ("sign", "columns", "units"
 _KIND_NAMES = {"dict": "table", "str": "text", "bool": "true or false", "int": "whole number", "float": "number"}
 
 
-def find_manifest(
-    manifest: str | os.PathLike[str] | bool | None, paths: Sequence[str | os.PathLike[str]]
-) -> Path | None:
-    """The manifest given, or the one in the folder that is read.
+def with_manifest(
+    paths: Paths, manifest: str | os.PathLike[str] | bool | None, given: Contents, keys: Kinds
+) -> tuple[list[str | os.PathLike[str]], Contents, tuple[str, ...]]:
+    """What is read, how it is read by the call and a manifest together, and a note if there is a manifest.
 
     Arguments:
+        paths: what is to be read; only a single folder has a manifest of its own, which may name the files in it.
         manifest: its path, from here or from the folder; True for `jaxdamp.toml` in the folder, if there is one; False
             or None for none.
-        paths: what is read; only a single folder has a manifest of its own.
+        given: arguments of the call, which win; columns, units and gains quantity by quantity.
+        keys: of the manifest.
     """
-    folders = [path for path in map(Path, paths) if path.expanduser().is_dir()] if len(paths) == 1 else []
+    asked: list[str | os.PathLike[str]] = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
+    folders = [Path(path) for path in asked if len(asked) == 1 and Path(path).expanduser().is_dir()]
+    file = _manifest(manifest, folders)
+    if file is None:
+        return asked, given, ()
+    stated = _read_manifest(file, keys)
+    if "files" in stated and folders:
+        asked = [folders[0].expanduser() / pattern for pattern in stated["files"]]
+    return asked, _merged(stated, given), (f"read as the manifest {file} says",)
+
+
+def _merged(stated: Contents, given: Contents) -> Contents:
+    """What a manifest says with what was given in the call, which wins."""
+    out = {key: value for key, value in stated.items() if key not in ("files", "test", "show")}
+    for key, value in given.items():
+        if key in TABLES:
+            out[key] = {**out.get(key, {}), **(value or {})}
+        elif value is not None or key not in out:
+            out[key] = value
+    if "test" in stated:
+        settings = out.get("settings") or {}
+        settings = {settings: {}} if isinstance(settings, str) else settings
+        out["settings"] = {"*": {"test": stated["test"]}, **settings}
+    return out
+
+
+def _manifest(manifest: str | os.PathLike[str] | bool | None, folders: Sequence[Path]) -> Path | None:
+    """The manifest given, or the one in the folder that is read."""
     if isinstance(manifest, bool | None):
         inside = [folder.expanduser() / NAME for folder in folders if manifest]
         return next((file for file in inside if file.is_file()), None)
@@ -60,7 +90,7 @@ def find_manifest(
     raise FileNotFoundError(f"There is no manifest {os.fspath(manifest)!r}{places}.")
 
 
-def read_manifest(file: Path, keys: Kinds) -> Contents:
+def _read_manifest(file: Path, keys: Kinds) -> Contents:
     """The arguments that a manifest holds.
 
     Raises:
@@ -80,18 +110,3 @@ def read_manifest(file: Path, keys: Kinds) -> Contents:
     if "columns" in stated:  # TOML has no None
         stated["columns"] = {role: None if name is False else name for role, name in stated["columns"].items()}
     return stated
-
-
-def merged(manifest: Contents, arguments: Contents) -> Contents:
-    """The manifest with what was given in the call, which wins; columns, units and gains quantity by quantity."""
-    out = {key: value for key, value in manifest.items() if key not in ("files", "test", "show")}
-    for key, value in arguments.items():
-        if key in TABLES:
-            out[key] = {**out.get(key, {}), **(value or {})}
-        elif value is not None or key not in out:
-            out[key] = value
-    if "test" in manifest:
-        settings = out["settings"] or {}
-        settings = {settings: {}} if isinstance(settings, str) else settings
-        out["settings"] = {"*": {"test": manifest["test"]}, **settings}
-    return out

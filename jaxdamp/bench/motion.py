@@ -131,15 +131,9 @@ def white_noise(values: Samples) -> float:
 
 
 def savitzky_golay_weights(half: int, order: int, derivative: int) -> Float[np.ndarray, "samples columns"]:
-    """Of 2 half + 1 neighbouring samples, in the coefficients of the least-squares polynomial around the middle one.
+    """Of 2 half + 1 neighbouring samples, a column for each, in the least-squares polynomial around the middle one.
 
-    Arguments:
-        half: samples to either side.
-        order: of the polynomial.
-        derivative: 0 for its value at each of the samples, 1 for its slope there, by sample.
-
-    Returns:
-        A row for each place in the window, a column for each sample.
+    A row for each place in the window gives the value there, or with `derivative` 1 the slope by sample.
     """
     places = np.arange(-half, half + 1) / max(half, 1)
     powers = np.vander(places, order + 1, increasing=True)

@@ -1,6 +1,5 @@
 """Channels of a record that have clocks of their own, brought onto one."""
 
-import functools
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -47,7 +46,7 @@ def one_record(parts: Sequence[RawTable], choice: Choice) -> list[RawTable]:
     main = complete or tables[:1]
     others = [table for table in tables if table not in main]
     if len(main) == 1:
-        main, others = _with_slow(main[0], others, choice)
+        main[0], others = _with_slow(main[0], others, choice)
     notes = _left_out(main[0], others)
     names = apart([name] * len(main))
     return [replace(t, record=n, notes=(*t.notes, *notes)) for t, n in zip(main, names, strict=True)]
@@ -71,16 +70,14 @@ def _left_out(table: RawTable, others: Sequence[RawTable]) -> list[str]:
     return [note] * bool(others)
 
 
-def _with_slow(table: RawTable, others: Sequence[RawTable], choice: Choice) -> tuple[list[RawTable], list[RawTable]]:
+def _with_slow(table: RawTable, others: Sequence[RawTable], choice: Choice) -> tuple[RawTable, list[RawTable]]:
     """A record with temperature and command of other tables on its clock, and the tables of which nothing is used."""
     unused = []
     for other in others:
         longer = _with_channels(table, other, choice)
-        if longer is None:
-            unused.append(other)
-        else:
-            table = longer
-    return [table], unused
+        table, left = (table, [other]) if longer is None else (longer, [])
+        unused += left
+    return table, unused
 
 
 def _with_channels(table: RawTable, other: RawTable, choice: Choice) -> RawTable | None:
@@ -96,16 +93,13 @@ def _with_channels(table: RawTable, other: RawTable, choice: Choice) -> RawTable
     rate = 1.0 / np.median(np.diff(slow.instants))
     note = f"{names} brought from a clock of {rate:.4g} Hz onto that of the record by straight lines"
     note += f"; not used of that clock: {', '.join(rest)}" * bool(rest)
-    return replace(
-        table,
-        columns=(*table.columns, *map(functools.partial(_straight, slow.instants, clock.instants), found)),
-        notes=(*table.notes, note),
-    )
+    brought = _straight(slow.instants, clock.instants, found)
+    return replace(table, columns=(*table.columns, *brought), notes=(*table.notes, note))
 
 
-def _straight(clock: Samples, instants: Samples, column: RawColumn) -> RawColumn:
-    """A channel at other instants than its own, by straight lines."""
-    return RawColumn(column.name, np.interp(instants, clock, np.asarray(column.values, np.float64)), column.unit)
+def _straight(clock: Samples, instants: Samples, columns: Sequence[RawColumn]) -> list[RawColumn]:
+    """Channels at other instants than their own, by straight lines."""
+    return [RawColumn(c.name, np.interp(instants, clock, np.asarray(c.values, np.float64)), c.unit) for c in columns]
 
 
 def _covers(clock: Samples, instants: Samples) -> bool:
@@ -175,8 +169,8 @@ def _together(tables: Sequence[RawTable], clocks: Sequence[_Clock], instants: Sa
 def _common_instants(tables: Sequence[RawTable], clocks: Sequence[Samples], names: str) -> tuple[Samples, str]:
     """The instants of the finest clock that all clocks cover, and a note."""
     for table, clock in zip(tables, clocks, strict=True):
-        check_numbers(clock, "time", table.where, table.lines)
-        check_order(clock, table.where, table.lines)
+        check_numbers(clock, "time", table.where, table.place)
+        check_order(clock, table.where, table.place)
         if gaps(clock).size:
             raise ArgumentError(f"{table.where}: the clock has gaps, over which nothing is interpolated. {_ONE_GROUP}")
     start, stop = max(clock[0] for clock in clocks), min(clock[-1] for clock in clocks)

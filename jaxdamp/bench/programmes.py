@@ -5,9 +5,10 @@ at mid-stroke, so that neither a machine nor a law with states starts with a jum
 its record shows the motion grow, from rest if there is a rest before it.
 """
 
+from abc import abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Protocol, final, runtime_checkable
+from typing import Any, Protocol, final, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -57,13 +58,29 @@ def growth(time: Samples, start: float | int, stop: float | int) -> tuple[Sample
     return s**3 * (10 - 15 * s + 6 * s**2), 30 * s**2 * (1 - s) ** 2 / (stop - start)
 
 
-class _Ends:
-    """What the two ends of a record show beside the steady motion, and the envelope that this gives the motion."""
+class Ramped:
+    """A steady motion under an envelope, by what the two ends of a record show beside it."""
 
-    rest_before: float | int
-    run_up: float | int
-    run_down: float | int
-    rest_after: float | int
+    rest_before: float | int = 0.0
+    run_up: float | int = 0.0
+    run_down: float | int = 0.0
+    rest_after: float | int = 0.0
+    warm_up: Any  # numbers: fields or properties
+    duration: Any
+
+    @abstractmethod
+    def _motion(self, time: Samples) -> tuple[Samples, Samples]:
+        """Stroke and velocity of the steady motion."""
+
+    def stroke(self, time: Samples) -> Samples:
+        """Stroke [m] at instants [s]."""
+        return self._envelope(time)[0] * self._motion(time)[0]
+
+    def velocity(self, time: Samples) -> Samples:
+        """Velocity [m/s] at instants [s]."""
+        grown, rate = self._envelope(time)
+        x, v = self._motion(time)
+        return grown * v + rate * x
 
     @property
     def begins_at_rest(self) -> bool:
@@ -78,22 +95,22 @@ class _Ends:
                 remedy = "Between rest and motion the amplitude needs time: the velocity must not jump."
                 _checks.refuse(ramp, f"be positive beside a `{rest}`", getattr(self, ramp), remedy)
 
-    def _envelope(self, time: Samples, warm_up: float | int, duration: float | int) -> tuple[Samples, Samples]:
+    def _envelope(self, time: Samples) -> tuple[Samples, Samples]:
         """Share of the steady amplitude at instants [s], and its rate [1/s]."""
-        start, stop = (
-            (self.rest_before, self.rest_before + self.run_up) if self.begins_at_rest else (-warm_up, -warm_up / 2)
-        )
+        start, stop = -self.warm_up, -self.warm_up / 2
+        if self.begins_at_rest:
+            start, stop = self.rest_before, self.rest_before + self.run_up
         grown, rate = growth(time, start, stop)
         if not self.run_down > 0:
             return grown, rate
-        end = duration - self.rest_after
+        end = self.duration - self.rest_after
         gone, loss = growth(time, end - self.run_down, end)
         return grown * (1 - gone), rate * (1 - gone) - grown * loss
 
 
 @final
 @dataclass(frozen=True)
-class SineTest(_Ends):
+class SineTest(Ramped):
     """Stroke x = a sin(2 π f t) from time zero on, or from the end of the run-up.
 
     Arguments:
@@ -156,12 +173,12 @@ class SineTest(_Ends):
 
     def stroke(self, time: Samples) -> Samples:
         """Stroke [m] at instants [s]."""
-        grown, _ = self._envelope(time, self.warm_up, self.duration)
+        grown, _ = self._envelope(time)
         return self.amplitude * grown * np.sin(2 * np.pi * self.frequency * (time - self.rest_before - self.run_up))
 
     def velocity(self, time: Samples) -> Samples:
         """Velocity [m/s] at instants [s]."""
-        grown, rate = self._envelope(time, self.warm_up, self.duration)
+        grown, rate = self._envelope(time)
         omega = 2 * np.pi * self.frequency
         angle = omega * (time - self.rest_before - self.run_up)
         return self.amplitude * (grown * omega * np.cos(angle) + rate * np.sin(angle))
@@ -169,7 +186,7 @@ class SineTest(_Ends):
 
 @final
 @dataclass(frozen=True)
-class RandomTest(_Ends):
+class RandomTest(Ramped):
     """Band-limited random stroke within a stroke and a velocity limit, as in paper 001.
 
     A sum of sines of equal amplitude and random phase, spaced by 1 / duration over the band and scaled so that the
@@ -267,16 +284,6 @@ class RandomTest(_Ends):
     def peak_velocity(self) -> float:
         """Largest |v| of the record [m/s]."""
         return float(np.max(np.abs(self.velocity(np.arange(0, self.duration, 0.01 / self.band[1])))))
-
-    def stroke(self, time: Samples) -> Samples:
-        """Stroke [m] at instants [s]."""
-        return self._envelope(time, self.warm_up, self.duration)[0] * self._motion(time)[0]
-
-    def velocity(self, time: Samples) -> Samples:
-        """Velocity [m/s] at instants [s]."""
-        grown, rate = self._envelope(time, self.warm_up, self.duration)
-        x, v = self._motion(time)
-        return grown * v + rate * x
 
 
 def _points_of_period(time: Samples, period: float | int) -> int:

@@ -110,7 +110,7 @@ class RawTable:
 
 
 class Problems:
-    """Collects errors, to raise them together.
+    """Collects errors of single things, to raise them together.
 
     >>> problems = Problems()
     >>> for text in ("one", "two"):
@@ -132,20 +132,18 @@ class Problems:
         """Keep the error of this block, if it has one, and go on behind it."""
         try:
             yield
-        except Several as several:
-            self.errors.extend(several.errors)
         except (ValueError, OSError, ImportError) as error:
             self.errors.append(error)
 
     def raise_any(self, remedy: str = "", *settings: Setting) -> None:
         """Raise what was collected: a single error as it is, several as one; and what else could be done."""
-        if len(self.errors) == 1:
-            (error,) = self.errors
+        errors = [each for error in self.errors for each in (error.errors if isinstance(error, Several) else [error])]
+        if len(errors) > 1:
+            raise Several(errors, remedy, *settings)
+        for error in errors:
             if remedy and isinstance(error, ValueError):
                 raise ArgumentError(f"{error} {remedy}", *getattr(error, "settings", ()), *settings) from error
             raise error
-        if self.errors:
-            raise Several(self.errors, remedy, *settings)
 
 
 class Several(ArgumentError):

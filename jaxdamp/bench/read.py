@@ -1,9 +1,10 @@
 """Files in, records in SI and one sign convention out: of a bench, or of a vehicle on a road or a rig."""
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, replace
+from fnmatch import fnmatchcase
+from functools import partial
 from pathlib import Path
 from typing import TypeVar, Unpack
 
@@ -16,11 +17,10 @@ from jaxdamp.bench import sign as signs
 from jaxdamp.bench.bench_tables import Interpretation, bench_runs
 from jaxdamp.bench.clock import FEWEST
 from jaxdamp.bench.columns import Choice, is_record, lacking
-from jaxdamp.bench.commands import Command, commanded
-from jaxdamp.bench.manifest import BENCH_KEYS, RIDE_KEYS, find_manifest, merged, read_manifest
+from jaxdamp.bench.manifest import BENCH_KEYS, RIDE_KEYS, Paths, with_manifest
 from jaxdamp.bench.one_clock import main_tables, on_one_clock, one_record
 from jaxdamp.bench.raw import Problems, RawTable
-from jaxdamp.bench.readers import BENCH_FILES, FILES, BenchFiles, Files, Reader, read_tables, with_own
+from jaxdamp.bench.readers import BENCH_FILES, FILES, BenchFiles, Files, read_tables, with_own
 from jaxdamp.bench.ride_record import RideInterpretation, RideRecord, ride_record
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import BenchSet
@@ -28,7 +28,7 @@ from jaxdamp.bench.settings import Settings, settings_by_name, settings_in_names
 from jaxdamp.bench.several_tests import tests_apart
 
 
-Paths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
+Command = float | int | str | Mapping[str, float | int]  # one number, one for each record, or a setting
 _Record = TypeVar("_Record")
 
 
@@ -95,33 +95,20 @@ def read(
     >>> print(run.notes[1])
     force and stroke of the file agree in sign (work per cycle +31.41 J)
     """
-    asked: list[str | os.PathLike[str]] = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
-    given: Contents = {"sign": sign, "force_sign": force_sign, "command": command, "settings": settings}
-    given |= files
-    own, note = given.pop("readers"), ()
-    readers = with_own(own)
-    file = find_manifest(manifest, asked)
-    if file is not None:
-        stated = read_manifest(file, BENCH_KEYS)
-        given, note = merged(stated, given), (f"read as the manifest {file} says",)
-        asked = _files_of(asked, stated)
+    given: Contents = {"sign": sign, "force_sign": force_sign, "command": command, "settings": settings, **files}
+    asked, given, note = with_manifest(paths, manifest, given, BENCH_KEYS)
     signs.check_words(given["sign"], given["force_sign"])
-    if given["sampling_rate"] is not None:
-        _checks.positive("sampling_rate", given["sampling_rate"])
     tables = ({**(given[name] or {})} for name in ("columns", "units", "gains"))
     choice = Choice(*tables, stroke_from_velocity=bool(given["stroke_from_velocity"]))
     how = Interpretation(choice, given["sign"], given["force_sign"], given["sampling_rate"], drop_bad_rows)
-    found = find_files(asked, {*FOLDER_SUFFIXES, *(own or {})})
-    runs, errors = _read_files(
-        found, readers, given["delimiter"], lambda tables, name, errors: _bench_runs(tables, name, how, errors)
-    )
-    if errors and not (skip_bad and runs):
+    runs, wrong, file_names = _read_files(asked, given, partial(_bench_runs, how=how))
+    if not (skip_bad and runs):
         ways, names = Setting("skip_bad", True), {base for base, _ in runs}
-        what = "file" if names <= {*_names(found)} else "record"
+        what = "file" if names <= {*file_names} else "record"
         others = f"The other {what}" if len(names) == 1 else f"The other {len(names)} {what}s"
-        _raise(errors, f"{others} can be read: {ways} leaves out what cannot." if runs else "", ways)
+        wrong.raise_any(f"{others} can be read: {ways} leaves out what cannot." if runs else "", ways)
     runs = [(base, replace(run, notes=(*run.notes, *note))) for base, run in runs]
-    return BenchSet(commanded(_with_settings(runs, given["settings"]), given["command"]), tuple(map(str, errors)))
+    return BenchSet(_commanded(_with_settings(runs, given["settings"]), given["command"]), map(str, wrong.errors))
 
 
 @with_defaults(FILES)
@@ -168,75 +155,38 @@ def read_rides(
     >>> record.units["sprung_acceleration"], round(float(record["sprung_acceleration"][0]), 6)
     ('m/s^2', 0.980665)
     """
-    asked: list[str | os.PathLike[str]] = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
-    given: Contents = {"columns": columns, "road": road, "reversed_channels": reversed_channels}
-    given |= files | {"sampling_rate": sampling_rate}
-    own, note = given.pop("readers"), ()
-    readers = with_own(own)
-    file = find_manifest(manifest, asked)
-    if file is not None:
-        given = merged(read_manifest(file, RIDE_KEYS), given)
+    given: Contents = {"columns": columns, "road": road, "reversed_channels": reversed_channels, **files}
+    asked, given, note = with_manifest(paths, manifest, given | {"sampling_rate": sampling_rate}, RIDE_KEYS)
+    if note:
         given |= {table: given[table] or None for table in ("columns", "units")}
-        note = (f"read as the manifest {file} says",)
-    if given["sampling_rate"] is not None:
-        _checks.positive("sampling_rate", given["sampling_rate"])
-    delimiter, found = given.pop("delimiter"), find_files(asked, {*FOLDER_SUFFIXES, *(own or {})})
-    how = RideInterpretation(**given)
-    records, errors = _read_files(
-        found,
-        readers,
-        delimiter,
-        lambda tables, name, errors: _rides(tables, name, how, errors),
-    )
-    _raise(errors)
+    how = RideInterpretation(**{field.name: given[field.name] for field in fields(RideInterpretation)})
+    records, wrong, _ = _read_files(asked, given, partial(_rides, how=how))
+    wrong.raise_any()
     return tuple(replace(record, notes=(*record.notes, *note)) for record in records)
 
 
-def _files_of(asked: list[str | os.PathLike[str]], manifest: Contents) -> list[str | os.PathLike[str]]:
-    """What is read: the files that the manifest names, if a folder is asked for."""
-    if "files" not in manifest or len(asked) > 1 or not Path(asked[0]).expanduser().is_dir():
-        return asked
-    return [Path(asked[0]).expanduser() / pattern for pattern in manifest["files"]]
-
-
 def _read_files(
-    files: Sequence[Path],
-    readers: Mapping[str, Reader],
-    delimiter: str | None,
-    records: Callable[[Sequence[RawTable], str, list[Exception]], list[_Record]],
-) -> tuple[list[_Record], list[Exception]]:
-    """The records that can be read, of all files, and what was wrong with the others."""
+    asked: Paths, given: Contents, records: Callable[[Sequence[RawTable], str, Problems], list[_Record]]
+) -> tuple[list[_Record], Problems, list[str]]:
+    """The records that can be read, of all files, what was wrong with the others, and the names of the files."""
+    readers = with_own(given["readers"])
+    if given["sampling_rate"] is not None:
+        _checks.positive("sampling_rate", given["sampling_rate"])
+    files = find_files(asked, {*FOLDER_SUFFIXES, *(given["readers"] or {})})
     good: list[_Record] = []
-    errors: list[Exception] = []
-    for file, name in zip(files, _names(files), strict=True):
-        wrong: list[Exception] = []
-        with _kept(wrong):
+    all_wrong, names = Problems(), _names(files)
+    for file, name in zip(files, names, strict=True):
+        wrong = Problems()
+        with wrong.collected():
             try:
-                good += records(read_tables(file, readers, delimiter), name, wrong)
+                good += records(read_tables(file, readers, given["delimiter"]), name, wrong)
             except ArithmeticError as error:
                 said = f"its numbers cannot be computed with ({type(error).__name__}: {error})"
                 raise ValueError(f"{file}: {said}. Export it again.") from error
-        unnamed = [type(error) is ValueError and str(file) not in str(error) for error in wrong]
-        errors += [ValueError(f"{file}: {e}") if bare else e for e, bare in zip(wrong, unnamed, strict=True)]
-    return good, errors
-
-
-@contextmanager
-def _kept(errors: list[Exception]) -> Iterator[None]:
-    """Keep the error of a record, or of a file, and go on behind it."""
-    try:
-        yield
-    except (ValueError, OSError, ImportError) as error:
-        errors.append(error)
-
-
-def _raise(errors: Sequence[Exception], remedy: str = "", *settings: Setting) -> None:
-    """Raise all errors as one, if there are any."""
-    problems = Problems()
-    for error in errors:
-        with problems.collected():
-            raise error
-    problems.raise_any(remedy, *settings)
+        for error in wrong.errors:
+            unnamed = type(error) is ValueError and str(file) not in str(error)
+            all_wrong.errors.append(ValueError(f"{file}: {error}") if unnamed else error)
+    return good, all_wrong, names
 
 
 def _names(files: Sequence[Path]) -> list[str]:
@@ -260,31 +210,31 @@ def _named(tables: Sequence[RawTable], name: str) -> list[tuple[RawTable, str]]:
 
 
 def _bench_runs(
-    tables: Sequence[RawTable], name: str, how: Interpretation, errors: list[Exception]
+    tables: Sequence[RawTable], name: str, wrong: Problems, how: Interpretation
 ) -> list[tuple[str, BenchRun]]:
-    """The records of a file, each with its name before it was cut at gaps; the errors of the others are kept.
+    """The records of a file, each with its name before it was cut at gaps; the errors of the others are collected.
 
     Tables without stroke and force, or too short, are left out of a file that has records, with a note.
     """
-    whole, runs = on_one_clock(_tests(tables, how.choice, errors), how.choice), []
+    whole, runs = on_one_clock(_tests(tables, how.choice, wrong), how.choice), []
     short = {table: _why_no_record(table, how.choice) for table in whole}
     good = [table for table, why in short.items() if not why]
     good = good or [table for table in whole if is_record(table, how.choice)] or whole
     left_out = [f"{t.record!r} of the file left out: {why}" for t, why in short.items() if t not in good]
     for table, base in _named(good, name):
-        with _kept(errors):
+        with wrong.collected():
             runs += [(base, replace(run, notes=(*run.notes, *left_out))) for run in bench_runs(table, base, how)]
     return runs
 
 
-def _tests(tables: Sequence[RawTable], choice: Choice, errors: list[Exception]) -> list[RawTable]:
-    """The tests of the tables, those of one name as one; the errors of those that do not fit together are kept."""
+def _tests(tables: Sequence[RawTable], choice: Choice, wrong: Problems) -> list[RawTable]:
+    """The tests of the tables, those of one name as one; the errors of those that do not fit together are collected."""
     parts: dict[str, list[RawTable]] = {}
     for part in (part for table in tables for part in tests_apart(table, choice)):
         parts.setdefault(part.record, []).append(part)
     whole = []
     for together in parts.values():
-        with _kept(errors):
+        with wrong.collected():
             whole += one_record(together, choice)
     return whole
 
@@ -297,11 +247,11 @@ def _why_no_record(table: RawTable, choice: Choice) -> str:
     return "" if len(table) >= FEWEST else f"{len(table)} samples, and a record needs {FEWEST}"
 
 
-def _rides(tables: Sequence[RawTable], name: str, how: RideInterpretation, errors: list[Exception]) -> list[RideRecord]:
-    """The records of a file with a vehicle; the errors of those that cannot be read are kept."""
+def _rides(tables: Sequence[RawTable], name: str, wrong: Problems, how: RideInterpretation) -> list[RideRecord]:
+    """The records of a file with a vehicle; the errors of those that cannot be read are collected."""
     records = []
     for table, base in _named(main_tables(tables), name):
-        with _kept(errors):
+        with wrong.collected():
             records.append(ride_record(table, base, how))
     return records
 
@@ -322,3 +272,44 @@ def _with_settings(
         )
         for base, run in runs
     ]
+
+
+def _commanded(runs: list[tuple[str, BenchRun]], command: Command | None) -> list[BenchRun]:
+    """The records with the commands given."""
+    if command is None:
+        return [run for _, run in runs]
+    if isinstance(command, str):
+        return [_held(run, _setting(run, command)) for _, run in runs]
+    if not isinstance(command, Mapping):
+        return [_held(run, command) for _, run in runs]
+    patterns = {base: [key for key in command if fnmatchcase(base, key)] for base, _ in runs}
+    _check_patterns(command, patterns)
+    return [_held(run, command[patterns[base][0]]) for base, run in runs]
+
+
+def _held(run: BenchRun, command: float | int) -> BenchRun:
+    """The record with a command that is held, whatever its column shows."""
+    note = (f"column of the command left out, since it is stated as {command:g}",) * (run.command_channel is not None)
+    return replace(run.held_at(command), notes=(*run.notes, *note))
+
+
+def _check_patterns(command: Mapping[str, float | int], patterns: Mapping[str, Sequence[str]]) -> None:
+    """Refuse commands for no record, and records with none or several commands."""
+    fitting = {key for keys in patterns.values() for key in keys}
+    unused = ", ".join(repr(key) for key in command if key not in fitting)
+    if unused:
+        _checks.refuse("command", "name records that are read", unused, f"There are {', '.join(patterns)}.")
+    doubtful = [f"{name} ({len(keys)})" for name, keys in patterns.items() if len(keys) != 1]
+    if doubtful:
+        must = "fit each record with exactly one pattern"
+        _checks.refuse("command", must, f"fitting otherwise for {', '.join(doubtful)}")
+
+
+def _setting(run: BenchRun, name: str) -> float:
+    """The setting of a record that is its command."""
+    value = run.settings.get(name)
+    if not isinstance(value, int | float):
+        settings = ", ".join(f"{key}={value!r}" for key, value in run.settings.items()) or "none"
+        must = f"name a setting that is a number, also of {run.name!r}"
+        _checks.refuse("command", must, repr(name), f"Its settings: {settings}.")
+    return float(value)

@@ -7,24 +7,11 @@ from typing import TypedDict
 
 from jaxdamp import _checks
 from jaxdamp._files import TEXT_SUFFIXES
+from jaxdamp.bench.channel_files import read_mdf, read_parquet, read_tdms
 from jaxdamp.bench.matlab import read_mat
-from jaxdamp.bench.mdf import read_mdf
-from jaxdamp.bench.raw import RawColumn, RawTable
-from jaxdamp.bench.raw_tables import library
-from jaxdamp.bench.tdms import read_tdms
+from jaxdamp.bench.raw import RawTable
 from jaxdamp.bench.text import read_text
 from jaxdamp.bench.workbook import read_xlsx
-
-
-def read_parquet(file: Path) -> list[RawTable]:
-    """Read a Parquet file; units may stand in the metadata of its fields, as "unit"."""
-    arrow = library("pyarrow", file)
-    table, columns = library("pyarrow.parquet", file).read_table(file), []
-    for field, data in zip(table.schema, table.columns, strict=True):
-        unit = (field.metadata or {}).get(b"unit", b"").decode()
-        values = (data.cast(arrow.float64()) if arrow.types.is_decimal(field.type) else data).to_numpy()
-        columns.append(RawColumn(field.name, values if values.dtype.kind != "O" else [str(v) for v in values], unit))
-    return [RawTable(file, tuple(columns))]
 
 
 Reader = Callable[[Path], list[RawTable]]

@@ -22,7 +22,7 @@ _NEAR = 0.85  # similarity of a name to another one from which it is taken for a
 _RECUR = 0.3  # share of the pairs of one motion that contradict, from which several settings were recorded
 
 
-def settings_by_name(names: Sequence[str], given: str | Mapping[str, Settings] | None) -> dict[str, dict]:
+def settings_by_name(names: Sequence[str], given: str | Mapping[str, Settings]) -> dict[str, dict]:
     """The settings of each record.
 
     Arguments:
@@ -38,8 +38,6 @@ def settings_by_name(names: Sequence[str], given: str | Mapping[str, Settings] |
     {'5mm_0.5A': {'current': 0.5}, '5mm_1A': {'current': 1.0}}
     """
     settings: dict[str, dict] = {name: {} for name in names}
-    if given is None:
-        return settings
     table = {given: {}} if isinstance(given, str) else given
     must = 'map patterns to settings, {"*_hot": {"temperature": "80 degC"}}, or be a pattern such as "*_{current}A"'
     _checks.instance("settings", table, Mapping, must)

@@ -31,6 +31,14 @@ class Decision:
     notes: tuple[str, ...]
 
 
+def require(sign: str | None, where: str, what: str, teller: str) -> None:
+    """Refuse numbers whose direction neither the file nor the caller tells."""
+    if sign is None:
+        ways = [Setting("sign", word) for word in SIGNS]
+        said = f"{where}: positive {what} may be rebound or compression, and the {teller} does not say which"
+        raise ArgumentError(f"{said}. Pass {ways[0]} or {ways[1]}.", *ways)
+
+
 def check_words(sign: str | None, force_sign: str | None) -> None:
     """Refuse words that are no sign."""
     if sign is not None:
@@ -79,16 +87,7 @@ def _there_and_back(time: Samples, stroke: Samples) -> Float[np.ndarray, " insta
 def decide(
     time: Samples, stroke: Samples, force: Samples, sign: str | None, force_sign: str | None, where: str
 ) -> Decision:
-    """How the channels of a file have to be turned.
-
-    Arguments:
-        time: instants [s].
-        stroke: as the file counts it [m].
-        force: as the file counts it [N].
-        sign: the direction in which the file counts stroke and velocity positive, or None.
-        force_sign: "same" if the file's force is positive when it resists motion in its positive direction,
-            "opposite" if it is negative then; None: with `sign` the same, without from the work.
-        where: the file, for messages.
+    """How the channels of a file have to be turned, by what is given (as for `bench.read`) and by the work.
 
     Raises:
         ValueError: what is given contradicts the work, or nothing is given and the work is too small to decide.

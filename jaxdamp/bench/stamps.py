@@ -28,13 +28,7 @@ def is_stamp(text: str) -> bool:
 def seconds(texts: np.ndarray, where: str, place: Callable[[int], str]) -> tuple[Float[np.ndarray, " time"], str]:
     """Time stamps as seconds from the first one, and a sentence on what was made of them.
 
-    Arguments:
-        texts: the stamps: ISO 8601, "hh:mm:ss.fff" with or without a date, with AM or PM.
-        where: the file and column, for messages.
-        place: where a sample stands in the file.
-
-    Raises:
-        ValueError: a text that is no time of day, several time zones, or a date of which day and month are unclear.
+    They are ISO 8601, or "hh:mm:ss.fff" with or without a date, with AM or PM, all of one time zone.
     """
     at_once = _at_once(texts)
     if at_once is not None:
@@ -58,11 +52,8 @@ def seconds(texts: np.ndarray, where: str, place: Callable[[int], str]) -> tuple
         raise ValueError(f"{where}: the time stamps have different time zones ({named}): export them in one.")
     if any(dates):
         return _from_first(values, _days(dates, where)), _NOTE
-    turns = np.flatnonzero(np.diff(values) < -_DAY / 2)
-    days = np.zeros(len(values))
-    for turn in turns:
-        days[turn + 1 :] += 1
-    return _from_first(values, days), _NOTE + (", with midnight in between" if len(turns) else "")
+    days = np.cumsum(np.diff(values, prepend=values[0]) < -_DAY / 2)
+    return _from_first(values, days), _NOTE + (", with midnight in between" if days[-1] else "")
 
 
 def _time_of_day(stamp: re.Match[str]) -> float:
@@ -87,7 +78,7 @@ def _at_once(texts: np.ndarray) -> Float[np.ndarray, " time"] | None:
         return None
 
 
-def _from_first(clock: Float[np.ndarray, " time"], days: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
+def _from_first(clock: Float[np.ndarray, " time"], days: np.ndarray) -> Float[np.ndarray, " time"]:
     return np.round((clock - clock[0]) + _DAY * (days - days[0]), 9)  # to a nanosecond: no rest of the subtraction
 
 

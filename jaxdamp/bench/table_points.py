@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from jaxdamp._checks import ArgumentError, Setting
 from jaxdamp._files import natural_key
+from jaxdamp.bench import sign as signs
 from jaxdamp.bench.columns import Choice, column_of, find_one
 from jaxdamp.bench.headers import role_of, split_header
 from jaxdamp.bench.raw import Problems, RawColumn, RawTable
@@ -276,7 +277,7 @@ def _oriented(side: Side, how: How, notes: list[str]) -> tuple[Points, Points]:
         notes.append("rebound and compression as headers or names say")
         return np.abs(velocity) * side.direction, np.abs(force) * side.direction
     if np.any(velocity < 0.0):
-        _require_sign(side, how, "velocities")
+        signs.require(how.sign, side.where, "velocities", "file")
         velocity = factor * velocity
         if not both:
             notes.append(f"positive velocity is {_positive(how)}; forces are magnitudes")
@@ -286,7 +287,7 @@ def _oriented(side: Side, how: How, notes: list[str]) -> tuple[Points, Points]:
         notes.append(f"positive velocity is {_positive(how)}; the force {agree}, because a damper takes in energy")
         return velocity, force if same else -force
     if both:
-        _require_sign(side, how, "forces")
+        signs.require(how.sign, side.where, "forces", "file")
         notes.append(f"positive force is {_positive(how)}")
         return velocity * np.sign(force) * factor, factor * force
     if how.side is None:
@@ -300,16 +301,6 @@ def _oriented(side: Side, how: How, notes: list[str]) -> tuple[Points, Points]:
 
 def _positive(how: How) -> str:
     return "compression, as it was said" if how.sign == "compression-positive" else "rebound, as it was said"
-
-
-def _require_sign(side: Side, how: How, what: str) -> None:
-    if how.sign is None:
-        ways = Setting("sign", "rebound-positive"), Setting("sign", "compression-positive")
-        raise ArgumentError(
-            f"{side.where}: positive {what} may be rebound or compression, and the file does not say which. Pass "
-            f"{ways[0]} or {ways[1]}.",
-            *ways,
-        )
 
 
 def _refuse_half(where: str, missing: str = "") -> None:

@@ -42,27 +42,11 @@ SIGNALS = ("count", "counts", "digit", "digits", "ma", "mv/v", "%fs")  # units o
 _WRITTEN = {
     "time": {"sec": "s", "secs": "s", "sek": "s", "msec": "ms", "µs": "us", "μs": "us"},
     "stroke": {"inch": "in", "inches": "in", '"': "in", "µm": "um", "μm": "um"},
-    "velocity": {
-        "m_s": "m/s",
-        "mm_s": "mm/s",
-        "cm_s": "cm/s",
-        "in_s": "in/s",
-        "ips": "in/s",
-        "mps": "m/s",
-        "mmps": "mm/s",
-    }
-    | {f"{unit}/{second}": f"{unit}/s" for unit in ("m", "mm", "cm", "in") for second in ("sec", "second")}
-    | {"inch/s": "in/s", "inches/s": "in/s", "inch/sec": "in/s"},
+    "velocity": {f"{unit}{per}": f"{unit}/s" for unit in ("m", "mm", "cm", "in") for per in ("_s", "/sec", "/second")}
+    | {"mps": "m/s", "mmps": "mm/s"}
+    | dict.fromkeys(("ips", "inch/s", "inches/s", "inch/sec"), "in/s"),
     "force": {"lb": "lbf", "lbs": "lbf", "pounds": "lbf", "newtons": "N", "kp": "kgf", "kg-f": "kgf"},
-    "temperature": {
-        "°c": "degC",
-        "c": "degC",
-        "deg_c": "degC",
-        "deg c": "degC",
-        "°f": "degF",
-        "f": "degF",
-        "deg f": "degF",
-    },
+    "temperature": dict.fromkeys(("°c", "c", "deg_c", "deg c"), "degC") | dict.fromkeys(("°f", "f", "deg f"), "degF"),
     "command": {"amp": "A", "amps": "A", "ampere": "A", "volt": "V", "volts": "V"},
 }
 
@@ -181,17 +165,10 @@ _GAIN = re.compile(rf"\s*({_NUMBER})\s*(.+?)\s*/\s*([^/\s]+)\s*(?:([+-])\s*({_NU
 
 
 def gain_conversion(role: str, gain: str, written: str, where: str) -> Conversion:
-    """How to bring a column to SI by the gain of its sensor.
+    """How to bring a column to SI by the gain of its sensor: quantity = gain · value + offset.
 
-    Arguments:
-        role: the quantity.
-        gain: "500 N/V", with an offset "10 mm/V - 2.5 mm": quantity = gain · value + offset.
-        written: unit of the column as the file states it; empty takes the one that the gain divides by.
-        where: the column, for messages.
-
-    Raises:
-        ValueError: a gain that does not read so, does not give that quantity, or divides by another unit than the
-            column has.
+    A gain is written "500 N/V", with an offset "10 mm/V - 2.5 mm". A column without a unit has that which the gain
+    divides by.
 
     >>> bring = gain_conversion("force", "0.5 kN/V + 20 N", "mV", "run.csv")
     >>> bring.unit, bring.factor, bring.offset

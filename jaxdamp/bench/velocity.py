@@ -10,8 +10,6 @@ A difference of neighbouring samples multiplies noise of σ metres by √2 times
   above the noise is motion, the rest is noise.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
@@ -78,9 +76,9 @@ def estimate_velocity(time: ArrayLike, stroke: ArrayLike, *, method: str | None 
     if method != "savitzky-golay":
         fit = _fit_harmonics(time, stroke, frequency)
         if fit is not None:
-            plural = "s" if fit.harmonics > 1 else ""
-            wave = f"{fit.frequency:.5g} Hz, {fit.harmonics} harmonic{plural}"
-            return fit.velocity, f"velocity from the stroke by harmonic regression, {wave}"
+            velocity, omega, count = fit
+            wave = f"{omega / (2 * np.pi):.5g} Hz, {count} harmonic{'s' * (count > 1)}"
+            return velocity, f"velocity from the stroke by harmonic regression, {wave}"
         if method == "harmonic":
             _checks.refuse(
                 "method",
@@ -93,12 +91,6 @@ def estimate_velocity(time: ArrayLike, stroke: ArrayLike, *, method: str | None 
     velocity = rate * savitzky_golay(stroke, window, order, derivative=1)
     width = f"{window} samples ({1e3 * (window - 1) / rate:.3g} ms)"
     return velocity, f"velocity from the stroke by a Savitzky-Golay filter of {width}, order {order}"
-
-
-class _Fit(NamedTuple):
-    frequency: float
-    harmonics: int
-    velocity: Samples
 
 
 def _basis(phase: Samples, harmonics: int) -> Float[np.ndarray, "time columns"]:
@@ -143,8 +135,8 @@ def _fit_frequency(t: Samples, stroke: Samples, omega: float, harmonics: int) ->
     return omega, coefficients
 
 
-def _fit_harmonics(time: Samples, stroke: Samples, frequency: float) -> _Fit | None:
-    """The steady periodic wave of a record, or None if it is not one."""
+def _fit_harmonics(time: Samples, stroke: Samples, frequency: float) -> tuple[Samples, float, int] | None:
+    """Velocity, angular frequency and number of harmonics of a steady periodic record, or None if it is not one."""
     rate = (len(time) - 1) / (time[-1] - time[0])
     most = min(_HARMONICS, int(0.4 * rate / frequency))
     if len(time) * frequency / rate < 1.9 or most < 1:
@@ -167,7 +159,7 @@ def _fit_harmonics(time: Samples, stroke: Samples, frequency: float) -> _Fit | N
     residual = stroke - basis @ coefficients
     if not _steady(t, residual, omega, float(np.hypot(coefficients[1], coefficients[1 + used]))):
         return None
-    return _Fit(omega / (2 * np.pi), used, _derivative(basis, omega, coefficients))
+    return _derivative(basis, omega, coefficients), omega, used
 
 
 def _significant(stroke: Samples, basis: Float[np.ndarray, "time columns"]) -> int | None:
@@ -239,21 +231,10 @@ def _response(half: int, order: int, omega: Float[np.ndarray, " lines"]) -> Floa
 
 
 def integrate_velocity(time: Samples, velocity: Samples, where: str) -> tuple[Samples, Samples, str]:
-    """Stroke and velocity without drift, and a sentence that says what was done.
+    """Stroke [m] and velocity [m/s] without drift, and a sentence that says what was done.
 
     A constant error of the velocity makes the stroke drift. It is the slope of the straight line through the means of
     the stroke over the full cycles, and is taken off the velocity. Zero stroke is the middle of the motion.
-
-    Arguments:
-        time: instants [s], uniform.
-        velocity: as measured [m/s].
-        where: the file, for messages.
-
-    Returns:
-        Stroke [m], velocity [m/s], and the sentence.
-
-    Raises:
-        ValueError: a velocity without a full cycle, from which drift cannot be told.
     """
     from scipy.interpolate import CubicSpline  # takes a second to import, and few records need it
 

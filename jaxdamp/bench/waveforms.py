@@ -1,16 +1,15 @@
 """Further tests of a bench: triangles, sums of a few sines, and commands of the damper that step."""
 
-from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, final, runtime_checkable
+from typing import Protocol, final, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp.bench.motion import Samples
-from jaxdamp.bench.programmes import Excitation, growth
+from jaxdamp.bench.programmes import Excitation, Ramped, growth
 from jaxdamp.bench.units import COMMAND_UNITS
 
 
@@ -155,29 +154,9 @@ class CommandStep:
         return before + (levels[number % len(levels)] - before) * risen
 
 
-class _Steady:
-    """A motion that grows over the first half of its warm-up."""
-
-    warm_up: Any  # a number: a field or a property
-
-    @abstractmethod
-    def _motion(self, time: Samples) -> tuple[Samples, Samples]:
-        """Stroke and velocity of the steady motion."""
-
-    def stroke(self, time: Samples) -> Samples:
-        """Stroke [m] at instants [s]."""
-        return growth(time, -self.warm_up, -self.warm_up / 2)[0] * self._motion(time)[0]
-
-    def velocity(self, time: Samples) -> Samples:
-        """Velocity [m/s] at instants [s]."""
-        grown, rate = growth(time, -self.warm_up, -self.warm_up / 2)
-        x, v = self._motion(time)
-        return grown * v + rate * x
-
-
 @final
 @dataclass(frozen=True)
-class TriangleTest(_Steady):
+class TriangleTest(Ramped):
     """Triangle of rounded turns: stroke x = a asin(k sin 2πft)/asin k, of nearly constant velocity between its ends.
 
     Arguments:
@@ -241,7 +220,7 @@ class TriangleTest(_Steady):
 
 @final
 @dataclass(frozen=True)
-class MultiSineTest(_Steady):
+class MultiSineTest(Ramped):
     """Several frequencies at once, each with the same peak velocity, within a stroke and a velocity limit.
 
     The phases are Schroeder's, φ_k = −π k² / n, for low peaks; the motion is scaled so that it touches one of the

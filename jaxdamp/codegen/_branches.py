@@ -41,11 +41,8 @@ def in_branches(
 ) -> list[Statement]:
     """The same statements, with the costly ones that only one side of selections takes in branches.
 
-    Arguments:
-        statements: of a block.
-        after: what follows them, which stays as it is.
-        results: names that are used after both in any case.
-        changing: names of variables that are assigned outside the block, which are no conditions.
+    What follows them stays as it is, and `results` are used after both in any case. Variables that are `changing`, by
+    assignments outside the block, are no conditions.
     """
     changing = {*changing, *(s.target.name for s in statements if isinstance(s, Declare))}
     cases = _cases([*statements, *after], results, changing)
@@ -67,10 +64,7 @@ def in_branches(
 def without_need(statements: Sequence[Statement], results: set[str], costly: set[str]) -> dict[str, bool] | None:
     """What conditions of selections have to be, by name, so that nothing costly is used; None if something always is.
 
-    Arguments:
-        statements: of a block, those inside loops in their place.
-        results: names that are used after it.
-        costly: names of what is costly.
+    Statements inside loops stand in the place of these.
     """
     cases = _cases(statements, results, set())
     needed = {cases[name] for name in costly}

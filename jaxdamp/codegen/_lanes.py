@@ -139,25 +139,20 @@ def _levels(statements: Iterable[Statement], known: dict[str, int]) -> dict[str,
     return levels
 
 
-class _Cheaper(NamedTuple):
-    """Statements that passes have made cheaper, with what these are based on."""
+def _cheaper(
+    statements: list[Statement], levels: dict[str, int], carried: dict[str, Atom]
+) -> tuple[list[Statement], dict[str, Atom], list[Kept], dict[str, Variable], dict[str, bool]]:
+    """What a step computes, in fewer operations; left as it is if it has branches.
 
-    statements: list[Statement]
-    carried: dict[str, Atom]
-    repeated: list[Kept]
-    limits: dict[str, Variable]
-    conditions: dict[str, bool]
-
-
-def _cheaper(statements: list[Statement], levels: dict[str, int], carried: dict[str, Atom]) -> _Cheaper:
-    """What a step computes, in fewer operations; left as it is if it has branches."""
+    With what is carried, values kept from the step before, limits, and conditions of a step without functions.
+    """
     if any(isinstance(s, Branch) for s in each(statements)):
-        return _Cheaper(statements, carried, [], {}, {})
+        return statements, carried, [], {}, {}
     repeated, carried, statements = _with_kept(_loaded(statements, levels), levels, carried)
     inside = {name for name, level in levels.items() if level == OF_BOTH}
     statements, limits = _limited(sums_of_products(statements, inside, carried), levels)
     conditions = _without_functions(statements, levels, names(carried.values()))
-    return _Cheaper(statements, carried, repeated, limits, conditions)
+    return statements, carried, repeated, limits, conditions
 
 
 def _parts(

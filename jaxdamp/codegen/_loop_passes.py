@@ -39,12 +39,8 @@ class Kept(NamedTuple):
 def kept_values(statements: Sequence[Statement], after: Mapping[str, Atom], results: Iterable[Atom]) -> list[Kept]:
     """Values of the carried numbers that the body computes again from what they will be in the next step.
 
-    What is evaluated at the beginning and at the end of each step, for instance: once is enough.
-
-    Arguments:
-        statements: of the body.
-        after: for each carried number, its value in the next step; for each number that stays the same, itself.
-        results: what is carried.
+    What is evaluated at the beginning and at the end of each step, for instance: once is enough. `after` holds what
+    each carried number is in the next step, and numbers that stay the same.
     """
     moved, defined = _computed_before(statements, after)
     outside = names(results)
@@ -97,12 +93,7 @@ def sums_of_products(statements: Sequence[Statement], inside: set[str], after: M
     """The same with products added last to each sum, one after the other, so that each is one multiply-add.
 
     Among products, what is computed last is added last, so that as little as possible waits for it. A sum stays on its
-    side of a loop.
-
-    Arguments:
-        statements: of the body.
-        inside: names of what is computed in every step.
-        after: for each carried number, its value in the next step.
+    side of a loop. `inside` is computed in every step; `after` holds the value of each carried number in the next one.
     """
     uses = Counter(a.name for a in after.values() if isinstance(a, Variable))
     for s in each(statements):

@@ -149,12 +149,7 @@ def _folder() -> Path:
 def registered(text: str, *functions: tuple[str, str]) -> str:
     """The name under which XLA calls functions of a C text, compiled once in a process.
 
-    Arguments:
-        text: C.
-        functions: a platform of XLA, "cpu" or "CUDA", and the function for it; `loop` on "cpu" if there are none.
-
-    Raises:
-        NotImplementedError: as `library`.
+    Functions are given with their platform of XLA, "cpu" or "CUDA"; without any it is `loop` on "cpu".
     """
     own, loops = f"jaxdamp_loop_{hashlib.sha256(text.encode()).hexdigest()[:20]}", library(text, LOOP)
     for where, function in functions or (("cpu", "loop"),):

@@ -44,14 +44,9 @@ def folded(operation: str, values: Sequence[Any], dtype: str) -> object:
 
 
 def simplified(operation: str, texts: Sequence[str]) -> int | None:
-    """The operand that a sum or a product is equal to, where another one is zero or one and all numbers are finite.
+    """Which operand a sum or a product is equal to, where another one is zero or one and all numbers are finite.
 
-    Arguments:
-        operation: name of it.
-        texts: the operands: numbers as Python writes them, or names.
-
-    Returns:
-        0 or 1, the place of the operand; None if no operand is the result.
+    The operands are texts: numbers as Python writes them, or names. None if no operand is the result.
     """
     zeros, ones = [text in ("0.0", "-0.0") for text in texts], [text == "1.0" for text in texts]
     if operation == "mul":
@@ -287,17 +282,17 @@ def _pruned_statement(statement: Statement, needed: set[str]) -> Statement | Non
     return statement
 
 
+def _with_inner(statements: Iterable[Statement]) -> Iterator[Statement]:
+    """Every statement, and those inside loops and branches."""
+    for s in statements:
+        yield s
+        for body in [s.body] if isinstance(s, Loop) else s.bodies if isinstance(s, Branch) else ():
+            yield from _with_inner(body)
+
+
 def written(statements: Iterable[Statement]) -> set[str]:
     """The names of the variables that statements define or assign, those inside loops and branches too."""
-    targets: set[str] = set()
-    for statement in statements:
-        if isinstance(statement, Loop):
-            targets |= written(statement.body)
-        elif isinstance(statement, Branch):
-            targets = targets.union(*map(written, statement.bodies))
-        elif not isinstance(statement, Leave):
-            targets.add(statement.target.name)
-    return targets
+    return {s.target.name for s in _with_inner(statements) if not isinstance(s, Loop | Branch | Leave)}
 
 
 def operands_of(statement: Statement) -> list[Atom | None]:
@@ -333,11 +328,4 @@ def names(atoms: Iterable[Atom | None]) -> set[str]:
 
 def names_in(statements: Iterable[Statement]) -> set[str]:
     """The names of the variables that statements read, those inside loops and branches too."""
-    used: set[str] = set()
-    for statement in statements:
-        if isinstance(statement, Loop):
-            used |= names_in(statement.body)
-        elif isinstance(statement, Branch):
-            used = used.union(*map(names_in, statement.bodies))
-        used |= names(operands_of(statement))
-    return used
+    return names(atom for s in _with_inner(statements) for atom in operands_of(s))

@@ -84,6 +84,7 @@ class ControlledProgram(VehicleProgram):
     """
 
     vehicle: Controlled
+    sampled = True
 
     def __init__(self, vehicle: Controlled, dtype: str) -> None:
         super().__init__(vehicle, dtype)

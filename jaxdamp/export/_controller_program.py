@@ -119,6 +119,7 @@ class ControllerProgram(PreparedProgram):
     """
 
     vehicle: Controlled
+    sampled = True
 
     def __init__(self, vehicle: Controlled, dtype: str) -> None:
         super().__init__(vehicle, dtype)

@@ -85,7 +85,10 @@ class AbstractProgram:
 
     Attributes:
         numbers: its parameters and settings.
+        sampled: whether it jumps at the samples of a controller.
     """
+
+    sampled = False
 
     def __init__(self, model: eqx.Module, dtype: str = "float64", member: str = "->") -> None:
         _checks.one_of("precision", dtype, ("float64", "float32"))

@@ -110,19 +110,14 @@ def _plain_function(value: Partial, where: str) -> Contents:
 
 
 def _quantity(value: object, unit: str | None, where: str) -> Contents:
-    numbers = _known_number(value, where)
-    if not np.issubdtype(numbers.dtype, np.floating):
-        _checks.refuse(where, "hold floating-point numbers", f"of type {numbers.dtype}")
-    _checks.finite(where, numbers)
-    return {"value": numbers.tolist()} | ({} if unit is None else {"unit": unit})
-
-
-def _known_number(value: object, where: str) -> np.ndarray:
     numbers = _checks.concrete(value)
     if numbers is None:
         remedy = "Call `to_json` outside `jax.jit`, `jax.vmap`, `jax.grad`."
         _checks.refuse(where, "have a known value", "traced", remedy)
-    return numbers
+    if not np.issubdtype(numbers.dtype, np.floating):
+        _checks.refuse(where, "hold floating-point numbers", f"of type {numbers.dtype}")
+    _checks.finite(where, numbers)
+    return {"value": numbers.tolist()} | ({} if unit is None else {"unit": unit})
 
 
 def rebuilt(plain: object, where: str) -> PyTree:

@@ -3,6 +3,7 @@
 import math
 import os
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -13,8 +14,15 @@ from jaxdamp._field_types import check_module
 from jaxdamp._writing import write_whole
 from jaxdamp.control import Signals
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.export._c_text import DERIVATIVES, INCLUDES, array_text, controller_source, law_source, vehicle_source
-from jaxdamp.export._controlled_program import ControlledProgram
+from jaxdamp.export._c_text import (
+    DERIVATIVES,
+    INCLUDES,
+    LANGUAGE,
+    array_text,
+    controller_source,
+    law_source,
+    vehicle_source,
+)
 from jaxdamp.export._controller_program import ControllerProgram, program_of
 from jaxdamp.export._law_program import LawProgram, identifier
 from jaxdamp.export._vehicle_program import VehicleProgram
@@ -45,12 +53,9 @@ def law_test(program: LawProgram, name: str) -> str:
     """The text of the program for a law; it returns zero if the greatest difference is due to rounding."""
     time, stroke, velocity = sample_motion(program.law)
     computed = respond(program.law, time, stroke, velocity, state=program.law.initial_state())
-    force = np.asarray(computed, float)
-    real = "double" if program.dtype == "float64" else "float"
-    close = _tolerance(program.dtype, computed.dtype)
-    arrays = [array_text(label, values) for label, values in (("x", stroke), ("v", velocity), ("expected", force))]
-    return f"""{_begin(name, "forces")}
-{"".join(arrays)}
+    arrays = {"x": stroke, "v": velocity, "expected": np.asarray(computed, float)}
+    real, close = LANGUAGE.types[program.dtype], _tolerance(program.dtype, computed.dtype)
+    return f"""{_begin(name, "forces", arrays)}
 int main(void) {{
     {name}_parameters p;
     {real} state[{name.upper()}_STATES + 1];
@@ -84,12 +89,11 @@ def vehicle_test(program: VehicleProgram, name: str) -> str:
     response = simulate(program.vehicle, from_profile(time, heights), dt=step, substeps=1)
     expected = np.stack([np.asarray(response[channel.name]) for channel in program.channels])
     greatest = np.abs(expected).max(axis=1)
-    real, upper = ("double" if program.dtype == "float64" else "float"), name.upper()
+    real, upper = LANGUAGE.types[program.dtype], name.upper()
     close = _tolerance(program.dtype, np.asarray(response[program.channels[0].name]).dtype)
     rates = np.gradient(heights, step, axis=0)
     arrays = {"heights": heights.ravel(), "rates": rates.ravel(), "expected": expected[:, -1], "greatest": greatest}
-    return f"""{_begin(name, "the channels at the end of a run")}
-{"".join(array_text(label, values) for label, values in arrays.items())}
+    return f"""{_begin(name, "the channels at the end of a run", arrays)}
 int main(void) {{
     static {name}_parameters p;
     static {real} m[{upper}_MATRICES], c[{upper}_CARRY], y[{upper}_OUTPUTS];
@@ -141,11 +145,9 @@ def controller_test(program: ControllerProgram, name: str) -> str:
     given = sample_signals(program, step)
     computed = program.run(jnp.asarray(given), step)
     expected = np.asarray(computed, float)
-    real, upper = ("double" if program.dtype == "float64" else "float"), name.upper()
-    close = _tolerance(program.dtype, computed.dtype)
+    real, upper, close = LANGUAGE.types[program.dtype], name.upper(), _tolerance(program.dtype, computed.dtype)
     arrays = {"given": given.ravel(), "expected": expected.ravel(), "greatest": np.abs(expected).max(axis=0)}
-    return f"""{_begin(name, "commands and demands")}
-{"".join(array_text(label, values) for label, values in arrays.items())}
+    return f"""{_begin(name, "commands and demands", arrays)}
 int main(void) {{
     {name}_parameters p;
     {real} m[{upper}_MATRICES], u[{upper}_INPUTS], c[{upper}_CARRY], y[{upper}_OUTPUTS];
@@ -174,13 +176,14 @@ def _tolerance(ours: object, computed: object) -> float:
     return 1e-9 if ours == computed == "float64" else 1e-3
 
 
-def _begin(name: str, what: str) -> str:
+def _begin(name: str, what: str, arrays: Mapping[str, np.ndarray]) -> str:
     return f"""/* Compares {name}.c with {what} that jaxdamp computed:  cc {name}.c {name}_test.c -lm && ./a.out */
 #include "{name}.h"
 
 #include <math.h>
 #include <stdio.h>
-"""
+
+{"".join(array_text(label, values) for label, values in arrays.items())}"""
 
 
 def to_c(
@@ -236,7 +239,7 @@ def to_c(
     program = program_of(law, part, precision)
     file = source_path(part if part == "controller" else type(law).__name__, path)
     name = file.stem
-    if derivatives and isinstance(program, ControlledProgram | ControllerProgram):
+    if derivatives and program.sampled:
         remedy = "Export `vehicle.passive`, with its dampers at fixed commands."
         _checks.refuse("derivatives", "be left out for a controller, which jumps at its samples", True, remedy)
     if isinstance(program, LawProgram):

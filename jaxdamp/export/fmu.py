@@ -97,7 +97,7 @@ def _of_controller(program: ControllerProgram) -> Iterator[Variable]:
 
 def _of_states(program: AnyProgram, first: int) -> list[Variable]:
     """The states, of which the first has this place, and their rates, if an importing tool may integrate them."""
-    if isinstance(program, ControlledProgram | ControllerProgram):
+    if isinstance(program, ControllerProgram) or program.sampled:
         return []
     if isinstance(program, LawProgram):
         states = [(f"state[{k}]", "") for k in range(program.states)]
@@ -126,7 +126,6 @@ def _of_number(number: LawNumber) -> Iterator[Variable]:
 def description(program: AnyProgram, known: list[Variable], name: str, guid: str) -> str:
     """The model description as XML; what is sampled is for co-simulation only."""
     model = program.law if isinstance(program, LawProgram) else program.vehicle
-    sampled = isinstance(program, ControlledProgram | ControllerProgram)
     root = ET.Element(
         "fmiModelDescription",
         fmiVersion="2.0",
@@ -140,7 +139,7 @@ def description(program: AnyProgram, known: list[Variable], name: str, guid: str
     can = {"canGetAndSetFMUstate": "true", "canSerializeFMUstate": "true", "canNotUseMemoryManagementFunctions": "true"}
     steps = {"canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": "true"}
     kinds = {"ModelExchange": {"providesDirectionalDerivative": "true"}, "CoSimulation": steps}
-    for kind, more in list(kinds.items())[sampled:]:
+    for kind, more in list(kinds.items())[program.sampled :]:
         files = ET.SubElement(ET.SubElement(root, kind, {"modelIdentifier": name} | can | more), "SourceFiles")
         ET.SubElement(files, "File", {"name": f"{name}.c"})
     step = program.vehicle.period if isinstance(program, ControllerProgram) else LONGEST_STEP
@@ -264,8 +263,7 @@ def _printed(program: AnyProgram) -> tuple[str, str]:
         return "law.c", law_source(program, "model", ("force", "state_rate")).static()
     if isinstance(program, ControllerProgram):
         return "controller.c", controller_source(program, "model").static()
-    derivatives = not isinstance(program, ControlledProgram)
-    return "vehicle.c", vehicle_source(program, "model", derivatives).static()
+    return "vehicle.c", vehicle_source(program, "model", not program.sampled).static()
 
 
 def _binary(contents: dict[str, bytes], name: str, compiler: str) -> dict[str, bytes]:

@@ -48,9 +48,7 @@ def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vector
     about, *others = table.comments  # the numbers of a law are in SI whatever is shown
     comments = [f"# {about}", *(f"# {shown.words(line)}" for line in others)]
     heading = ",".join(f"{name} [{unit.unit}]" for name, unit in zip(("velocity", "force"), units, strict=True))
-    written = write_whole(path, "\n".join([*comments, heading, *rows]) + "\n")
-    warn_of_rows(written, table)
-    return written
+    return _written(path, "\n".join([*comments, heading, *rows]) + "\n", table)
 
 
 class SettledTable(NamedTuple):
@@ -94,10 +92,17 @@ def settled_table(law: AbstractDamper, velocities: VectorLike, call: str, *, tur
     return SettledTable(settled, np.asarray(curve.force)[curve.settled], comments, curve.note)
 
 
-def warn_of_rows(written: Path, table: SettledTable) -> None:
-    """A Python warning of rows that are not in the file."""
+def _written(path: str | os.PathLike[str], content: str | bytes, table: SettledTable) -> Path:
+    """Write a file, with a Python warning of rows that are not in it."""
+    written = write_whole(path, content)
     if table.left_out:
         warn(f"{written.name}: rows left out. {table.left_out}")
+    return written
+
+
+def _in_ascii(lines: list[str]) -> bytes:
+    """Lines in ASCII, which all these programs read."""
+    return "\n".join([*lines, ""]).replace("−", "-").replace("\N{DEGREE SIGN}", "").encode("ascii", "replace")
 
 
 def _range_lines(law: AbstractDamper, velocity: np.ndarray, *, turned: bool) -> list[str]:
@@ -159,7 +164,7 @@ def to_adams(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vect
         "{  vel          force}",
         *(f"{1e3 * v:14.6f}  {f:14.6f}" for v, f in zip(table.velocity, table.force, strict=True)),
     ]
-    return _written(path, lines, table)
+    return _written(path, _in_ascii(lines), table)
 
 
 @of_known_numbers
@@ -191,7 +196,7 @@ def to_carsim(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vec
         "ENDTABLE",
         "END",
     ]
-    return _written(path, lines, table)
+    return _written(path, _in_ascii(lines), table)
 
 
 @of_known_numbers
@@ -222,20 +227,7 @@ def to_matlab(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vec
     table, content = _table(law, velocities, "to_matlab(law, path, velocities)"), io.BytesIO()
     about = "\n".join(table.comments)
     savemat(content, {"velocity": table.velocity[:, None], "force": table.force[:, None], "about": about})
-    written = write_whole(path, content.getvalue())
-    warn_of_rows(written, table)
-    return written
-
-
-class _Side(NamedTuple):
-    """The straight lines of one direction in Assetto Corsa."""
-
-    slow: float
-    fast: float
-    threshold: float
-
-    def force(self, speed: np.ndarray) -> np.ndarray:
-        return self.slow * np.minimum(speed, self.threshold) + self.fast * np.maximum(speed - self.threshold, 0.0)
+    return _written(path, content.getvalue(), table)
 
 
 @of_known_numbers
@@ -271,29 +263,26 @@ def to_assetto_corsa(
         if speed.size < 3:
             must = f"hold three velocities or more in {'compression' if sign < 0 else 'rebound'}"
             _checks.refuse("velocities", must, table.velocity, table.left_out)
-        side = _two_lines(speed, force)
-        misfit = np.sqrt(np.mean((side.force(speed) - force) ** 2) / np.mean(force**2))
+        slow, fast, threshold, misfit = _two_lines(speed, force)
         lines += [
             f"; two straight lines differ from the table by {100 * misfit:.1f} % of its RMS force",
-            f"DAMP_{name}={side.slow * motion_ratio**2:.1f}",
-            f"DAMP_FAST_{name}={max(side.fast * motion_ratio**2, 0.1):.1f}",  # zero stands for the slow rate
-            f"DAMP_FAST_{name}THRESHOLD={side.threshold / motion_ratio:.4f}",
+            f"DAMP_{name}={slow * motion_ratio**2:.1f}",
+            f"DAMP_FAST_{name}={max(fast * motion_ratio**2, 0.1):.1f}",  # zero stands for the slow rate
+            f"DAMP_FAST_{name}THRESHOLD={threshold / motion_ratio:.4f}",
         ]
-    return _written(path, lines, table)
+    return _written(path, _in_ascii(lines), table)
 
 
-def _two_lines(speed: np.ndarray, force: np.ndarray) -> _Side:
-    """The best two lines that are not falling, with the threshold at one of the speeds."""
+def _two_lines(speed: np.ndarray, force: np.ndarray) -> tuple[float, float, float, float]:
+    """Slow and fast rate of the best two lines that are not falling, the threshold at one of the speeds, the misfit."""
     from scipy.optimize import nnls
 
-    best, least = None, np.inf
+    lines = []
     for threshold in np.unique(speed)[:-1]:
         parts = np.stack([np.minimum(speed, threshold), np.maximum(speed - threshold, 0.0)], axis=1)
-        rates, error = nnls(parts, force)
-        if error < least:
-            best, least = _Side(float(rates[0]), float(rates[1]), float(threshold)), error
-    assert best is not None
-    return best
+        (slow, fast), error = nnls(parts, force)
+        lines.append((float(slow), float(fast), float(threshold), float(error / np.linalg.norm(force))))
+    return min(lines, key=lambda line: line[-1])
 
 
 def _table(law: AbstractDamper, velocities: VectorLike, call: str) -> SettledTable:
@@ -331,11 +320,3 @@ def _left_out(law: AbstractDamper, table: SettledTable) -> list[str]:
 
 def _section(name: str) -> list[str]:
     return [f"${name:->71}", f"[{name}]"]
-
-
-def _written(path: str | os.PathLike[str], lines: list[str], table: SettledTable) -> Path:
-    """Write lines in ASCII, which all these programs read."""
-    text = "\n".join([*lines, ""]).replace("−", "-").replace("\N{DEGREE SIGN}", "")
-    written = write_whole(path, text.encode("ascii", "replace"))
-    warn_of_rows(written, table)
-    return written

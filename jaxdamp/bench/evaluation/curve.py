@@ -1,6 +1,6 @@
-"""What is measured of a damper: figures of the cycles of a record, and its force-velocity curve at one setting."""
+"""What is measured of a damper: figures of cycles, and forces over velocity at one setting."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -10,6 +10,8 @@ from jaxtyping import Float
 from jaxdamp._display import plus_minus
 from jaxdamp._tables import Cell, Shown
 from jaxdamp.bench.analysis import NEAR_PEAK, FoldedCycles
+from jaxdamp.bench.contradictions import repeats
+from jaxdamp.bench.runs import BenchRun
 
 
 @dataclass(frozen=True)
@@ -70,15 +72,6 @@ Cycles = Float[np.ndarray, "cycles points"]
 Figures = Float[np.ndarray, " cycles"]
 
 
-def record_measurements(cycles: FoldedCycles, setting: str, record: str) -> list[Measurement]:
-    """Every figure of a record, the mean over its steady cycles with the scatter from cycle to cycle."""
-    figures = cycle_figures(cycles)
-    return [
-        Measurement(quantity, unit, *measured(values), setting=setting, record=record)
-        for (quantity, unit), values in figures.items()
-    ]
-
-
 def cycle_figures(cycles: FoldedCycles) -> dict[tuple[str, str], Figures]:
     """The figures of each cycle by quantity and unit.
 
@@ -92,7 +85,9 @@ def cycle_figures(cycles: FoldedCycles) -> dict[tuple[str, str], Figures]:
       so that a spring (gas) of rate k adds 2 k X.
     """
     stroke, velocity, force = cycles.stroke, cycles.velocity, cycles.force
-    rebound, compression = _peak_masks(velocity)
+    highest, lowest = velocity.max(axis=1, keepdims=True), velocity.min(axis=1, keepdims=True)
+    rebound = (velocity >= NEAR_PEAK * highest) & (highest > 0)  # near the largest velocity of the direction
+    compression = (velocity <= NEAR_PEAK * lowest) & (lowest < 0)
     forces = _mean_where(force, rebound), _mean_where(force, compression)
     span = np.ptp(stroke, axis=1, keepdims=True)
     middle = 0.5 * (stroke.max(axis=1, keepdims=True) + stroke.min(axis=1, keepdims=True))
@@ -116,12 +111,6 @@ def cycle_figures(cycles: FoldedCycles) -> dict[tuple[str, str], Figures]:
         ("hysteresis area", "W"): -_loop_integral(force, velocity),
         ("hysteresis width", "N"): ends[0] - ends[1],
     }
-
-
-def _peak_masks(velocity: Cycles) -> tuple[np.ndarray, np.ndarray]:
-    """The samples of each cycle near the largest velocity of rebound, and of compression."""
-    highest, lowest = velocity.max(axis=1, keepdims=True), velocity.min(axis=1, keepdims=True)
-    return (velocity >= NEAR_PEAK * highest) & (highest > 0), (velocity <= NEAR_PEAK * lowest) & (lowest < 0)
 
 
 def _mean_where(values: Cycles, where: np.ndarray) -> Figures:
@@ -170,10 +159,8 @@ def interpolated(points: Sequence[PeakForce], velocity: float) -> tuple[float, f
     one, two = points[after - 1], points[after]
     share = (velocity - one.velocity) / (two.velocity - one.velocity)
     have_scatter = one.scatter is not None and two.scatter is not None
-    scatter = (
-        float(np.hypot((1 - share) * (one.scatter or 0.0), share * (two.scatter or 0.0))) if have_scatter else None
-    )
-    return (1 - share) * one.force + share * two.force, scatter, 2
+    between = float(np.hypot((1 - share) * (one.scatter or 0.0), share * (two.scatter or 0.0)))
+    return (1 - share) * one.force + share * two.force, between if have_scatter else None, 2
 
 
 def in_window(points: Sequence[PeakForce], velocity: float, window: float) -> tuple[float, float | None, int]:
@@ -221,9 +208,8 @@ def rates_and_knees(cycles: FoldedCycles, setting: str, record: str) -> list[Mea
     """
     measurements = []
     for name, sign in DIRECTIONS.items():
-        rows = np.array(
-            [_bend(*cycle, sign) for cycle in zip(cycles.stroke, cycles.velocity, cycles.force, strict=True)]
-        )
+        each = zip(cycles.stroke, cycles.velocity, cycles.force, strict=True)
+        rows = np.array([_bend(*cycle, sign) for cycle in each])
         quantities = (f"{name} rate", f"{name} low-speed rate", f"{name} high-speed rate", f"{name} knee velocity")
         for quantity, column in zip(quantities, rows.T, strict=True):
             if np.isfinite(column).mean() >= 0.5:
@@ -275,3 +261,89 @@ def _solve(rows: Float[np.ndarray, "knees terms points"], force: Cycle) -> tuple
     solutions = np.matmul(vectors, (inverse * along)[..., None])[..., 0] / sizes
     left = np.matmul(solutions[:, None, :], rows)[:, 0] - force
     return solutions, np.einsum("kp,kp->k", left, left)
+
+
+WINDOW = 0.05  # share of a stated velocity within which samples, or records, count as taken at it
+
+
+def fastest(runs: Sequence[BenchRun]) -> BenchRun:
+    """The record of the largest velocity."""
+    return max(runs, key=lambda run: run.peak_velocity)
+
+
+def forces_at(
+    velocities: Sequence[float] | None,
+    setting: str,
+    runs: Sequence[BenchRun],
+    cycles: Mapping[str, FoldedCycles],
+    of_records: Sequence[Measurement],
+    method: str,
+    window: float,
+) -> list[Measurement]:
+    """Forces and their ratio at the stated velocities; without any stated, at those that the records reach."""
+    measurements, peaks, loop = [], _peaks_of(setting, runs, of_records), cycles[fastest(runs).name]
+    for velocity in OEM_VELOCITIES if velocities is None else velocities:
+        forces = {}
+        for direction, sign in DIRECTIONS.items():
+            if method == "loop":
+                forces[direction] = on_loop(loop, sign, velocity, window)
+            elif method == "window":
+                forces[direction] = in_window(peaks[direction], velocity, window)
+            else:
+                forces[direction] = interpolated(peaks[direction], velocity)
+        values = [force[0] for force in forces.values()]
+        if velocities is None and not np.isfinite(values).any():
+            continue
+        more = {"setting": setting, "velocity": float(velocity)}
+        measurements += [Measurement(f"{name} force", "N", *force, **more) for name, force in forces.items()]
+        measurements.append(Measurement("rebound/compression ratio", "", *_ratio(*forces.values()), **more))
+    return measurements
+
+
+def _peaks_of(
+    setting: str, runs: Sequence[BenchRun], measurements: Sequence[Measurement]
+) -> dict[str, list[PeakForce]]:
+    """Forces at the peak velocities of the records of a setting, by direction."""
+    of_records = [m for m in measurements if m.record and m.setting == setting]
+    return {direction: _peak_forces(runs, of_records, direction) for direction in DIRECTIONS}
+
+
+def _peak_forces(runs: Sequence[BenchRun], of_records: Sequence[Measurement], direction: str) -> list[PeakForce]:
+    """Force at the peak velocity of a direction, one for each motion: repeated records are averaged."""
+    by = {(m.record, m.quantity): m for m in of_records}
+    peaks = []
+    for group in repeats(runs):
+        velocity = np.array([abs(by[run.name, f"{direction} velocity"].value) for run in group])
+        forces = [by[run.name, f"{direction} force"] for run in group]
+        value, between, count = measured(np.array([m.value for m in forces]))
+        within = [m.scatter for m in forces if m.scatter is not None]
+        parts = [] if between is None else [between]
+        parts += [float(np.sqrt(np.mean(np.square(within))))] if within else []
+        if count and np.isfinite(velocity).all():
+            scatter = float(np.linalg.norm(parts)) if parts else None
+            peaks.append(PeakForce(float(velocity.mean()), value, scatter))
+    return peaks
+
+
+def span(
+    settings: Mapping[str, Sequence[BenchRun]], measurements: Sequence[Measurement], method: str
+) -> tuple[float, float, str]:
+    """The lowest and highest velocity at which the records of all settings give a force, equal if at none; in words."""
+    peaks = [points for name, runs in settings.items() for points in _peaks_of(name, runs, measurements).values()]
+    spans = [[point.velocity for point in points] for points in peaks if points]
+    low, high = max(map(min, spans), default=0.0), min(map(max, spans), default=0.0)
+    low = 0.0 if method == "loop" else low
+    words = f"the records give forces from {low:.3g} to {high:.3g} m/s" if low < high else "the records enclose none"
+    return low, max(low, high), words
+
+
+def _ratio(
+    one: tuple[float, float | None, int], other: tuple[float, float | None, int]
+) -> tuple[float, float | None, int]:
+    """Ratio of the magnitudes of two forces; their scatters taken as independent."""
+    if not other[0]:
+        return float("nan"), None, 0
+    value = abs(one[0] / other[0])
+    has_scatter = one[1] is not None and other[1] is not None and one[0] != 0.0
+    scatter = float(value * np.hypot((one[1] or 0.0) / one[0], (other[1] or 0.0) / other[0])) if has_scatter else None
+    return value, scatter, min(one[2], other[2])

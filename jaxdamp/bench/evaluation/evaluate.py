@@ -11,10 +11,9 @@ from jaxdamp._one_thread import one_thread
 from jaxdamp.bench.analysis import FoldedCycles, as_records, fold_cycles
 from jaxdamp.bench.contradictions import repeats
 from jaxdamp.bench.evaluation import curve
-from jaxdamp.bench.evaluation.curve import Measurement, record_measurements
+from jaxdamp.bench.evaluation.curve import WINDOW, Measurement, fastest, forces_at, measured, span
 from jaxdamp.bench.evaluation.result import Evaluation
 from jaxdamp.bench.evaluation.separation import GasAndFriction, separate_gas_and_friction
-from jaxdamp.bench.evaluation.stated import WINDOW, forces_at, peaks_of, span
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.settings import by_number, settings_apart
 
@@ -105,11 +104,14 @@ def _of_setting(
     window: float,
 ) -> list[Measurement]:
     """The figures of the records at one setting, its forces at the stated velocities, its rates and knees."""
-    of_records = [m for run in runs for m in record_measurements(cycles[run.name], name, run.name)]
-    peaks = peaks_of(name, runs, of_records)
-    fastest = max(runs, key=lambda run: run.peak_velocity).name
-    at_velocities = forces_at(velocities, peaks, cycles[fastest], name, method, window)
-    return [*of_records, *at_velocities, *curve.rates_and_knees(cycles[fastest], name, fastest)]
+    of_records = [
+        Measurement(quantity, unit, *measured(values), setting=name, record=run.name)
+        for run in runs
+        for (quantity, unit), values in curve.cycle_figures(cycles[run.name]).items()
+    ]
+    at_velocities = forces_at(velocities, name, runs, cycles, of_records, method, window)
+    record = fastest(runs).name
+    return [*of_records, *at_velocities, *curve.rates_and_knees(cycles[record], name, record)]
 
 
 def _notes(runs: Sequence[BenchRun]) -> list[str]:
@@ -170,8 +172,7 @@ def _not_reached(
     missed = [v for v in velocities or () if v not in reached]
     if not missed and (velocities is not None or reached):
         return [], []
-    peaks = {name: peaks_of(name, runs, measurements) for name, runs in settings.items()}
-    low, high, where = span(peaks, method)
+    low, high, where = span(settings, measurements, method)
     if velocities is not None:
         return [f"No force at {v:.4g} m/s: {where}." for v in missed], []
     found, instead = list[Measurement](), "Add records of other velocities."
@@ -180,7 +181,6 @@ def _not_reached(
         velocity = max(float(np.floor(high * 10.0**digits) / 10.0**digits), low)
         instead = f"Forces are stated at {velocity:.4g} m/s."
         for name, runs in settings.items():
-            fastest = cycles[max(runs, key=lambda run: run.peak_velocity).name]
-            found += forces_at([velocity], peaks[name], fastest, name, method, window)
+            found += forces_at([velocity], name, runs, cycles, measurements, method, window)
     usual = f"None of the usual velocities, from {curve.OEM_VELOCITIES[0]:g} m/s on, is reached"
     return [f"{usual}: {where}. {instead}"], found

@@ -5,14 +5,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._documents import read_text
 from jaxdamp._results import AbstractResult, drawn_by
-from jaxdamp._tables import Column, Table, plain
+from jaxdamp._tables import Column, Contents, Table, plain
 from jaxdamp.bench.evaluation.curve import DIRECTIONS, Measurement, at_velocity
 from jaxdamp.bench.headers import split_header
 from jaxdamp.bench.layout import DELIMITERS, Layout, columns_of, split
@@ -162,7 +162,7 @@ class LimitCheck(AbstractResult):
             rows.append((*start, unit, low, m.cell if m else None, high, verdict))
         return Table(f"Limits: {'all passed' if self.passed else 'not all passed'}", columns, tuple(rows))
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """Verdict and rows as plain data."""
         return {"passed": self.passed, "results": plain(self.table().records())}
 

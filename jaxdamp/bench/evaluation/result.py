@@ -12,10 +12,9 @@ from jaxdamp._tables import Cell, Column, Compared, Contents, Table, comparison_
 from jaxdamp._types import Figure
 from jaxdamp.bench.analysis import FoldedCycles
 from jaxdamp.bench.contradictions import repeats
-from jaxdamp.bench.evaluation.curve import Measurement, at_velocity, measured
+from jaxdamp.bench.evaluation.curve import WINDOW, Measurement, at_velocity, forces_at, measured, span
 from jaxdamp.bench.evaluation.limits import Limit, LimitCheck
 from jaxdamp.bench.evaluation.separation import GasAndFriction
-from jaxdamp.bench.evaluation.stated import WINDOW, forces_at, peaks_of, span
 from jaxdamp.bench.runs import BenchRun
 
 
@@ -170,15 +169,14 @@ class Evaluation(AbstractResult):
 
         Forces are evaluated at the velocities of the limits too, as at those given to `bench.evaluate`.
         """
-        limits, more = tuple(limits), list[Measurement]()
-        peaks = {name: peaks_of(name, runs, self.measurements) for name, runs in self.settings.items()}
+        limits, found = tuple(limits), self.measurements
+        wanted = dict.fromkeys(limit.velocity for limit in limits if limit.velocity is not None)
         for name, runs in self.settings.items():
             own = [m for m in self.measurements if m.setting == name]
-            wanted = dict.fromkeys(limit.velocity for limit in limits if limit.velocity is not None)
             missing = [velocity for velocity in wanted if not any(at_velocity(m, velocity) for m in own)]
-            fastest = self.cycles[max(runs, key=lambda run: run.peak_velocity).name]
-            more += forces_at(missing, peaks[name], fastest, name, self.method, self.window)
-        return LimitCheck.of((*self.measurements, *more), limits, span(peaks, self.method)[2])
+            more = forces_at(missing, name, runs, self.cycles, self.measurements, self.method, self.window)
+            found = (*found, *more)
+        return LimitCheck.of(found, limits, span(self.settings, self.measurements, self.method)[2])
 
     def content(self) -> Contents:
         """All measurements as plain data."""

@@ -217,9 +217,8 @@ def _of_order(parts: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], order:
         left, more = float(np.sum((force - columns @ solution) ** 2)), max(len(u) - len(scale), 0)
         shares = np.diag(np.linalg.pinv((columns / scale).T @ (columns / scale)))
         error = np.sqrt(np.maximum(shares, 0.0) * left / max(more, 1)) / scale  # rounding may leave less than zero
-        slopes = [
-            (1 - LOWEST_SHARE**k) / (1 - LOWEST_SHARE) for k in range(1, order + 1)
-        ]  # means of u^k over the range
+        # means of u^k over the range
+        slopes = [(1 - LOWEST_SHARE**k) / (1 - LOWEST_SHARE) for k in range(1, order + 1)]
         rates = [np.dot(solution[3::2], slopes), -np.dot(solution[4::2], np.array(slopes) * _ALTERNATING[:order])]
         values.append([*solution[:3], *(np.array(rates) / high if order else (np.nan, np.nan))])
         errors.append(error[:3])

@@ -23,13 +23,6 @@ _DELAY = 0.004  # of a period
 _GAIN = 0.05
 
 
-class _Step(NamedTuple):
-    """The two levels that a series is best described by."""
-
-    size: float
-    last: int  # of the first level
-
-
 def changes(e: Examined) -> list[Finding]:
     """A level, a delay or a gain of the force with one value before and another one behind an instant.
 
@@ -48,15 +41,16 @@ def changes(e: Examined) -> list[Finding]:
     force = e.run.force[e.moving]
     span = float(np.ptp(np.quantile(force, (0.01, 0.99))))
     kinds = (
-        ("delay", "delay changes", delay, _least_delay(e), "s"),
-        ("force level", "force level changes", offset, _LEVEL * span, "N"),
-        ("gain", "gain changes", gain, _GAIN, ""),
+        ("delay changes", delay, _least_delay(e), "s"),
+        ("force level changes", offset, _LEVEL * span, "N"),
+        ("gain changes", gain, _GAIN, ""),
     )
-    for _, name, series, least, unit in kinds:
+    for name, series, least, unit in kinds:
         step = _step(series)
-        if step is not None and abs(step.size) > least:
-            place = (int(parts[step.last]), int(parts[min(step.last + 2, len(parts) - 1)]) - 1)
-            return _said(e, name, step.size, unit, place)
+        if step is not None and abs(step[0]) > least:
+            size, last = step
+            place = (int(parts[last]), int(parts[min(last + 2, len(parts) - 1)]) - 1)
+            return _said(e, name, size, unit, place)
     return []
 
 
@@ -149,8 +143,11 @@ def _of_parts(e: Examined, parts: np.ndarray) -> tuple[Samples, Samples, Samples
     return terms[:, 0], terms[:, 1], terms[:, 2]
 
 
-def _step(series: Float[np.ndarray, " parts"]) -> _Step | None:
-    """The step of a series, if it is clear and no drift; the part in which it lies belongs to neither level."""
+def _step(series: Float[np.ndarray, " parts"]) -> tuple[float, int] | None:
+    """The step of a series and the last part before it, if it is clear and no drift.
+
+    The part in which it lies belongs to neither level.
+    """
     n = len(series)
     x = series - series.mean()
     sums, squares = np.cumsum(x), np.cumsum(x**2)
@@ -165,4 +162,4 @@ def _step(series: Float[np.ndarray, " parts"]) -> _Step | None:
     size = float(means[1][at] - means[0][at])
     if abs(size) < _CLEAR * error or left[at] > _BETTER * drift:
         return None
-    return _Step(size, int(last[at]))
+    return size, int(last[at])

@@ -2,13 +2,13 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
-from jaxdamp._results import AbstractResult, CallableText
+from jaxdamp._results import AbstractResult, CallableText, drawn_by
 from jaxdamp._tables import Cell, Column, Contents, Table, plain
 from jaxdamp.bench.analysis import as_records, peak_velocity_points
 from jaxdamp.bench.contradictions import contradictions
@@ -16,10 +16,6 @@ from jaxdamp.bench.preflight import changes, consistency, motion_checks, sample_
 from jaxdamp.bench.preflight.finding import SEVERITIES, Examined, Finding
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sign import OPPOSITE
-
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 
 # In this order; where one family finds an error in a record, the later ones are left out for it.
@@ -133,11 +129,7 @@ class Preflight(AbstractResult):
         """All findings as plain data."""
         return {"ok": self.ok, "records": list(self.records), "findings": plain(self.table().records())}
 
-    def plot(self) -> "matplotlib.figure.Figure":
-        """Which finding is in which record."""
-        from jaxdamp import plots
-
-        return plots.preflight(self)
+    plot = drawn_by("preflight", "Which finding is in which record.")
 
     def __repr__(self) -> str:
         return "\n".join([self.summary, *(f"- {sentence}" for sentence in self.sentences())])
@@ -293,13 +285,11 @@ def hysteresis_or_delay(findings: Sequence[Finding]) -> list[Finding]:
         return list(findings)
     remedy = "Fit a law with memory: a lag, a series spring, Bouc-Wen, LuGre."
     spread = f"it is {1e3 * sizes.min():.3g} to {1e3 * sizes.max():.3g} ms over the records, so no delay of a channel"
-    judged = {
-        id(f): replace(
-            f, severity="note", name="hysteresis", message=f"{f.message.split(':')[0]}; {spread}", remedy=remedy
-        )
-        for f in late
-    }
-    return [judged.get(id(finding), finding) for finding in findings]
+    note = {"severity": "note", "name": "hysteresis", "remedy": remedy}
+    said = (f"{finding.message.split(':')[0]}; {spread}" for finding in findings)
+    return [
+        replace(f, message=words, **note) if f.name == "delay" else f for f, words in zip(findings, said, strict=True)
+    ]
 
 
 def gas_of_the_slowest(findings: Sequence[Finding], runs: Sequence[BenchRun]) -> list[Finding]:

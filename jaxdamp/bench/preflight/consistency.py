@@ -5,8 +5,8 @@ from jaxtyping import Float
 
 from jaxdamp._checks import ArgumentError
 from jaxdamp.bench.analysis import FoldedCycles
-from jaxdamp.bench.evaluation import separate_gas_and_friction
 from jaxdamp.bench.evaluation.curve import cycle_figures, measured
+from jaxdamp.bench.evaluation.separation import separate_gas_and_friction
 from jaxdamp.bench.motion import Samples
 from jaxdamp.bench.preflight.finding import CLEAR, Examined, Finding
 from jaxdamp.bench.sign import LEAST_LOSS

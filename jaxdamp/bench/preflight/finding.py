@@ -77,9 +77,7 @@ def _resolution(values: Samples, still: int, stretches: int) -> float:
 
 MAINS = (50.0, 60.0)  # Hz
 _HARMONICS = 5  # of the mains
-_PERIODS = (
-    20  # of a line, at least: the noise is that of lines up to so many beside it, which zero frequency must not be
-)
+_PERIODS = 20  # of a line, at least: the noise is that of so many lines beside it, which must not be of zero frequency
 _RIPPLE = 3.0  # times the harmonics of the motion beside it
 
 

@@ -175,15 +175,11 @@ def _unit_remedy(e: Examined, channel: str, true: str, of_rate: bool) -> str:
     """How to read the file again; a time that goes on by one may count the samples instead."""
     if of_rate:
         return "State the rate of the file in Hz, `sampling_rate=...`."
-    counts = (
-        channel == "time" and abs(e.run.sampling_rate * _SECONDS.get(e.run.units.get("time", ""), 0.0) - 1.0) < 1e-9
-    )
     remedy = f'If it is {true}, read the file with `units={{"{channel}": "{true}"}}`'
-    return (
-        f'{remedy}; if it counts samples, with `columns={{"time": None}}` and `sampling_rate=...`.'
-        if counts
-        else f"{remedy}."
-    )
+    per_unit = e.run.sampling_rate * _SECONDS.get(e.run.units.get("time", ""), 0.0)
+    if channel == "time" and abs(per_unit - 1.0) < 1e-9:
+        remedy += '; if it counts samples, with `columns={"time": None}` and `sampling_rate=...`'
+    return f"{remedy}."
 
 
 def jitter(e: Examined) -> list[Finding]:

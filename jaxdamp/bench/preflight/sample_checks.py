@@ -209,12 +209,8 @@ def clipping(e: Examined) -> list[Finding]:
     findings = []
     for name, values in e.channels.items():
         for side, extreme in (("largest", values.max()), ("smallest", values.min())):
-            flat = [(a, b) for a, b in runs_of(values == extreme) if b > a + 1]
-            flat = [
-                pair
-                for pair in flat
-                if _goes_on(values, *pair, e.noise[name]) and pair[1] - pair[0] <= STUCK * e.samples_per_cycle
-            ]
+            flat = [(a, b) for a, b in runs_of(values == extreme) if 1 < b - a <= STUCK * e.samples_per_cycle]
+            flat = [pair for pair in flat if _goes_on(values, *pair, e.noise[name])]
             count = sum(b - a + 1 for a, b in flat)
             if count >= 4:
                 share = 100 * count / len(values)
