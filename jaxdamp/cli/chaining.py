@@ -1,5 +1,6 @@
 """The whole chain: `jaxdamp report` with records, and `jaxdamp demo` on a damper whose truth is known."""
 
+import functools
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,10 +13,10 @@ from jaxdamp._tables import Table
 from jaxdamp.bench import BenchSet, SineTest, VirtualDyno
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.fitting import Fitted, fit_laws, show, write_fits
-from jaxdamp.cli.jobs import Output, job, with_step_warnings, without_range_warnings, write_tables
+from jaxdamp.cli.jobs import Output, job, write_tables
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.records import Reading, decisions, grouped, law_names
-from jaxdamp.cli.riding import Driving, show_ride, unusual
+from jaxdamp.cli.riding import Driving, driven, show_ride, unusual
 from jaxdamp.cli.tuning import exit_code_of, tuned, tuning_arguments, write_tuning
 from jaxdamp.cli.vehicle_words import parse_vehicle
 from jaxdamp.cli.wording import message
@@ -94,7 +95,7 @@ def report(
             screen.points(sentences)
             result = tuned(screen, call)
             cars["tuned law"] = result.vehicle
-        rides = driven(screen, cars, surface, run, "Driving")
+        rides = _driven(screen, cars, surface, run, "Driving")
         tables = show_ride(screen, rides)
         with work.saving("Tuned law, vehicle and tables") as draft:
             if result is not None:
@@ -112,18 +113,12 @@ def _nothing_to_tune(law: AbstractDamper, search: Call) -> bool:
     return "over" not in search.given and adjustable <= set(not_identified(law))
 
 
-def driven(
+def _driven(
     screen: Screen, cars: Mapping[str, AbstractVehicle], road: AbstractRoad, run: Run, title: str
 ) -> dict[str, Response]:
     """Each vehicle on the road."""
-    rides: dict[str, Response] = {}
-    with screen.stage(title, total=len(cars)) as advance:
-        for name, car in cars.items():
-            advance(name, len(rides))
-            with without_range_warnings():
-                rides[name], remarks = with_step_warnings(lambda car=car: simulate(car, road, **run))
-            screen.points([f"{name}: {remark}" for remark in remarks], style="yellow")
-    return rides
+    say = functools.partial(screen.points, style="yellow")
+    return driven(screen, cars, lambda car: simulate(car, road, **run), say, title)
 
 
 TRUE = "true damper"
@@ -269,7 +264,7 @@ def _rides(screen: Screen, scenario: Scenario, fits: Fitted) -> dict[str, dict[s
     cars = {name: _car(law) for name, law in {TRUE: scenario.law, **{r.name: r.result.law for r in both}}.items()}
     rides = {}
     for title, road in surfaces.items():
-        whole = driven(screen, cars, road, {"duration": scenario.duration}, f"Quarter car on {title}")
+        whole = _driven(screen, cars, road, {"duration": scenario.duration}, f"Quarter car on {title}")
         end = scenario.duration if title == ISO else min(scenario.duration, EVENT)  # one program for both lengths
         rides[title] = {name: response.between(0.0, end) for name, response in whole.items()}
         show_ride(screen, rides[title])

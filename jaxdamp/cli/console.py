@@ -144,12 +144,8 @@ def _printed(text: str, style: str = "") -> Text:
 
 def literal(text: str, style: str = "") -> Text:
     """A text as it is, with control characters made visible: names out of files must not command the terminal."""
-    shown = "".join(_escaped(c) if category(c) == "Cc" and c not in "\n\t" else c for c in text)
-    return Text(shown, style=style)
-
-
-def _escaped(character: str) -> str:
-    return character.encode("unicode_escape").decode()
+    unsafe = {c: c.encode("unicode_escape").decode() for c in text if category(c) == "Cc" and c not in "\n\t"}
+    return Text("".join(unsafe.get(c, c) for c in text), style=style)
 
 
 def prepare(*, quickly: bool) -> None:

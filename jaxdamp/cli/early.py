@@ -21,11 +21,7 @@ ROADS = ("iso", "white", "bump")
 
 
 def check(command: str, given: Arguments) -> None:
-    """Refuse paths that lead nowhere, files that are not JSON, and a folder that may not be written.
-
-    Raises:
-        ValueError: such a path, file or folder.
-    """
+    """Refuse paths that lead nowhere, files that are not JSON, and a folder that may not be written."""
     if "out" in given and given.get("block") is None:  # a part writes no results
         again = {"replace": bool(given["replace"]), "resume": bool(given.get("resume"))}
         refuse_target(resuming.target_of(command, given), command, **again)

@@ -45,11 +45,9 @@ class OneFile:
     replace: bool = False
 
     def checked(self, name: str, beside: Sequence[str] = ()) -> Path:
-        """The file to write, refused if it or one beside it exists and is not to be replaced.
+        """The file to write, by this name if none or a folder is given; or a refusal.
 
-        Arguments:
-            name: of the file if none or a folder is given.
-            beside: endings, in place of its own, of the files that are written with it.
+        Neither it nor a file `beside` it with these endings may exist, unless it is to be replaced.
         """
         file = Path(name) if self.file is None else self.file
         whole = file / name if file.is_dir() else file

@@ -218,11 +218,7 @@ def fit_laws(
     keep_bad: bool = False,
     **options: Any,
 ) -> Fitted:
-    """Fit the laws of these names on a test machine, one after the other. Ctrl-C keeps those that are finished.
-
-    Raises:
-        ValueError: records that contradict each other; not one law could be fitted.
-    """
+    """Fit the laws of these names on a test machine, one after the other. Ctrl-C keeps those that are finished."""
     apart = [] if keep_bad else bench.contradictions(tuple(runs), same_command=options.get("scheduled", False))
     if apart:
         words = " ".join(bench.contradictions_in_words(apart))

@@ -60,11 +60,7 @@ def exit_code() -> int:
 
 
 def check() -> None:
-    """End the work here if Ctrl-C was pressed. To be called between computations, never inside one.
-
-    Raises:
-        Interrupted: Ctrl-C was pressed.
-    """
+    """End the work here if Ctrl-C was pressed. To be called between computations, never inside one."""
     if _watch.asked and not _watch.saving:
         raise Interrupted
 

@@ -73,30 +73,19 @@ class Job(NamedTuple):
 def job(
     screen: Screen, command: str, output: Output, page: Path | None = None, *, resume: bool = False
 ) -> Iterator[Job]:
-    """The results of a command; at the end the terminal says what was written and what could not be made."""
-    target, screen.verbose = output.out or Path(f"jaxdamp-{command}"), output.verbose
-    attempts = Attempts(interrupt.check, message)
-    folder = results_folder(target, command, replace=output.replace, resume=resume)
-    with another_page(page, target, replace=output.replace or resume), folder as results:
-        yield Job(screen, results, attempts)
-    screen.files(target, results.published)
-    screen.points(attempts.troubles, style="yellow")
-
-
-@contextlib.contextmanager
-def another_page(page: Path | None, target: Path, *, replace: bool = False) -> Iterator[None]:
-    """A copy of the report of a results folder in another place, written when all is done.
-
-    Raises:
-        ValueError: the file is there already, or is a folder.
-    """
-    if page is not None and (page.is_dir() or (page.exists() and not replace)):
+    """The results of a command, its page also in another place; the terminal says at the end what was written."""
+    if page is not None and (page.is_dir() or (page.exists() and not (output.replace or resume))):
         what = "is a folder: name a file" if page.is_dir() else "is there already: name another file"
         raise ValueError(f"{str(page)!r} {what} with --report{', or pass --replace' * page.is_file()}.")
-    yield
+    target, screen.verbose = output.out or Path(f"jaxdamp-{command}"), output.verbose
+    attempts = Attempts(interrupt.check, message)
+    with results_folder(target, command, replace=output.replace, resume=resume) as results:
+        yield Job(screen, results, attempts)
     if page is not None:
         page.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(target.expanduser() / "report.html", page)
+    screen.files(target, results.published)
+    screen.points(attempts.troubles, style="yellow")
 
 
 def write_tables(folder: Path, tables: Mapping[str, Table]) -> None:
@@ -111,17 +100,10 @@ def write_json(file: Path, contents: Contents) -> None:
     file.write_text(json.dumps(contents, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
-@contextlib.contextmanager
-def without_range_warnings() -> Iterator[None]:
-    """No Python warnings of laws outside their range: the tables and remarks of the command say it."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", OutsideFittedRangeWarning)
-        yield
-
-
 def with_step_warnings(drive: Callable[[], Response]) -> tuple[Response, list[str]]:
-    """A run, and what it warns of its step; other warnings pass."""
+    """A run, and what it warns of its step; that laws leave their range the tables and remarks say, the rest passes."""
     with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("ignore", OutsideFittedRangeWarning)
         warnings.simplefilter("always", CoarseStepWarning)
         response = drive()
     texts = []

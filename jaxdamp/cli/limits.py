@@ -17,11 +17,7 @@ GRAVITY = {"g": "g_0"}  # of accelerations, where it is no gram
 
 
 def in_si(limits: Mapping[str, Limit], car: AbstractVehicle, *, white: bool) -> tuple[dict[str, Limit], list[str]]:
-    """Limits by short name or ride metric with their ends in SI; and what they are, where that is not as written.
-
-    Raises:
-        ValueError: a word that is no metric of the car, a unit of something else.
-    """
+    """Limits by short name or ride metric with their ends in SI; and what they are, where that is not as written."""
     units, found, said = {m.name: m.unit(car.units) for m in car.ride_metrics}, dict[str, Limit](), list[str]()
     for word, span in limits.items():
         _checks.one_of("limit", word, car.metric_words)
@@ -37,29 +33,25 @@ def in_si(limits: Mapping[str, Limit], car: AbstractVehicle, *, white: bool) -> 
 
 
 def bounds_in_si(bounds: Mapping[str, tuple[Bound, Bound]], models: Iterable[object]) -> dict[str, tuple[Bound, ...]]:
-    """Bounds of parameters by path, last part or pattern, with their ends in SI.
-
-    Raises:
-        ValueError: a unit of something else, or of no parameter.
-    """
+    """Bounds of parameters by path, last part or pattern, with their ends in SI."""
     with_unit = [name for name, span in bounds.items() if any(isinstance(end, str) for end in span)]
-    units = {p.path: p.unit for model in models if with_unit for p in named_parameters(model, bounds)}
-    of = {name: units[match_paths(list(units), [name])[0]] for name in with_unit}
+    of = {name: unit_of(name, bounds, *models) for name in with_unit}
     return {name: tuple(_in_si("bound", name, end, of.get(name, "")) for end in span) for name, span in bounds.items()}
 
 
-def axes_in_si(over: Mapping[str, Axis], car: AbstractVehicle) -> dict[str, np.ndarray]:
-    """The axes of a sweep by path, last part or pattern, in SI.
+def unit_of(name: str, names: Iterable[str], *models: object) -> str:
+    """The unit of the first parameter that one of these names means."""
+    units = {p.path: p.unit for model in models for p in named_parameters(model, names)}
+    return units[match_paths(list(units), [name])[0]]
 
-    Raises:
-        ValueError: a unit of something else, or of no parameter.
-    """
-    units = {p.path: p.unit for p in named_parameters(car, over)}
+
+def axes_in_si(over: Mapping[str, Axis], car: AbstractVehicle) -> dict[str, np.ndarray]:
+    """The axes of a sweep by path, last part or pattern, in SI."""
     found = dict[str, np.ndarray]()
     for name, (values, written) in over.items():
-        factor = ratio(written, units[match_paths(list(units), [name])[0]]) if written else 1.0
+        unit = unit_of(name, over, car) if written else ""
+        factor = ratio(written, unit) if written else 1.0
         if factor is None:
-            unit = units[match_paths(list(units), [name])[0]]
             _checks.refuse("over", f"be in a unit of {name}, such as {unit or 'none'}", repr(written))
         found[name] = factor * values
     return found

@@ -33,15 +33,10 @@ _LIMITS = re.compile(r"\{(\w+): \((\w+), ([\w ]+)\)\}")
 
 @dataclass(frozen=True)
 class Call:
-    """The arguments of a library function that were given as options.
+    """The arguments of a library function that were given as options."""
 
-    Attributes:
-        target: dotted name of the function inside the package.
-        given: values by the name of the argument, wherever it is nested in objects of options.
-    """
-
-    target: str
-    given: Arguments = field(default_factory=dict)
+    target: str  # dotted name of the function inside the package
+    given: Arguments = field(default_factory=dict)  # by the name of the argument, also of nested ones
 
     def arguments(self, **more: object) -> Arguments:
         """All of these, and more, as the function takes them: those of nested options in objects of their classes."""

@@ -84,11 +84,7 @@ class Reading:
         return runs.process(**steps) if steps else runs
 
     def checked(self, screen: Screen, runs: BenchSet, *, refuse: bool = False) -> tuple[BenchSet, Preflight]:
-        """The records without an error, and the findings on all of them but those on rest that is cut off.
-
-        Raises:
-            ValueError: every record has an error, or one has and errors are refused.
-        """
+        """The records without an error, and the findings on all of them but those on rest that is cut off."""
         with screen.stage("Checking the records"):
             found = bench.preflight(runs).without(() if self.keep_rest else _CUT_OFF)
         self._show(screen, found)
@@ -195,13 +191,7 @@ def grouped(runs: BenchSet, name: str | None) -> tuple[dict[str, BenchSet], str]
     """The records by the name of a folder for each value of a setting; all of them by an empty name without one.
 
     Without a name, records of the same motion that contradict one another are divided as `bench.evaluate` divides them,
-    where what they state or a word of their names tells them apart.
-
-    Returns:
-        The groups; and a sentence where the records divided them.
-
-    Raises:
-        ValueError: a record does not state the setting, or two values would have the same folder.
+    where what they state or a word of their names tells them apart. A sentence says so.
     """
     sentence = ""
     if name is None:

@@ -66,7 +66,7 @@ class Results:
             for name in fresh:
                 sync(self.draft / name)
             own = set(self._published)
-            self._published |= {name: _sha256(self.draft / name) for name in fresh}
+            self._published |= {name: resuming.sha256(self.draft / name) for name in fresh}
             if not self.target.exists():
                 self._tell(self.draft, missing)
                 mask = os.umask(0)
@@ -192,27 +192,21 @@ def _written(results: Results) -> Iterator[Results]:
 
 
 def refuse_target(target: Path, command: str, *, replace: bool, resume: bool = False) -> None:
-    """Refuse a folder that the command may not write.
-
-    Raises:
-        ValueError: as `results_folder`.
-    """
+    """Refuse a folder that the command may not write."""
     target = target.expanduser()
     if not (resume and _resumed(target, command)):
         _earlier_files(target, command, replace)
 
 
 def _resumed(target: Path, command: str) -> bool:
-    """Whether the folder holds what an interrupted run wrote that can be resumed.
-
-    Raises:
-        ValueError: a file of it was changed since.
-    """
+    """Whether the folder holds what an interrupted run wrote that can be resumed."""
     manifest = _manifest(target) if resuming.kept(target) else {}
     if manifest.get("command") != command or manifest.get("complete"):
         return False
     hashes = manifest.get("sha256", {})
-    changed = [name for name, was in hashes.items() if (target / name).is_file() and _sha256(target / name) != was]
+    changed = [
+        name for name, was in hashes.items() if (target / name).is_file() and resuming.sha256(target / name) != was
+    ]
     if changed:
         raise ValueError(
             f"{str(target / changed[0])!r} was changed since the run was interrupted, and --resume would replace it: "
@@ -309,7 +303,7 @@ def _unchanged(folder: Path, manifest: Contents) -> list[str]:
         path = folder / name
         if name == MANIFEST or not _inside(folder, name) or not path.is_file():
             continue
-        if name == UNFINISHED or not manifest.get("complete") or hashes.get(name) == _sha256(path):
+        if name == UNFINISHED or not manifest.get("complete") or hashes.get(name) == resuming.sha256(path):
             files.append(name)
     return files
 
@@ -332,8 +326,3 @@ def _remove_empty(folder: Path, root: Path) -> None:
     while folder != root and folder.is_dir() and not any(folder.iterdir()):
         folder.rmdir()
         folder = folder.parent
-
-
-def _sha256(file: Path) -> str:
-    with file.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -31,11 +31,7 @@ _now: dict[str, dict[str, str]] = {}  # the command that is running, in words
 
 
 def noted(command: str, given: Mapping[str, object]) -> AbstractContextManager[None]:
-    """While this lasts, what the command was given is known; one is refused that would resume another.
-
-    Raises:
-        ValueError: arguments, files or versions differ from those of the run to be resumed.
-    """
+    """While this lasts, what the command was given is known; one is refused that would resume another."""
     resumes = command in COMMANDS and given.get("each") is None  # the fits of a line have a store of their own
     now = _described(command, given) if resumes else {}
     alone = given.get("block") is None  # parts go on by their store
@@ -146,23 +142,19 @@ def _described(command: str, given: Mapping[str, object]) -> dict[str, dict[str,
     files |= {folder / "jaxdamp.toml" for folder in {Path.cwd(), *(file.parent for file in files)}}
     for value in options.values():
         files |= {Path(str(part)).expanduser() for part in (value if isinstance(value, list) else [value])}
-    sums = {f"{file}": _sum(file) for file in sorted(files) if file.is_file()}
+    sums = {f"{file}": sha256(file)[:16] for file in sorted(files) if file.is_file()}
     versions = {name: version(name) for name in ("jaxdamp", "jax", "numpy")} | {"Python": sys.version.split()[0]}
-    return {
-        "command": {"the command": command},
-        "options": words,
-        "files": sums,
-        "versions": versions,
-    }
+    return {"command": {"the command": command}, "options": words, "files": sums, "versions": versions}
 
 
 def _in_words(value: object) -> str:
     return " ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
-def _sum(file: Path) -> str:
+def sha256(file: Path) -> str:
+    """The sum of a file."""
     with file.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()[:16]
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def _forget_old(place: Path) -> None:

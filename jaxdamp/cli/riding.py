@@ -1,6 +1,6 @@
 """`jaxdamp ride`: a law in a vehicle on a road, beside a baseline; and what words mean as roads."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -13,17 +13,11 @@ from jaxdamp._tables import typeset_unit
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.controlling import Controlling
 from jaxdamp.cli.early import refuse_road
-from jaxdamp.cli.jobs import Output, job, with_step_warnings, without_range_warnings, write_tables
+from jaxdamp.cli.jobs import Output, job, with_step_warnings, write_tables
+from jaxdamp.cli.limits import unit_of
 from jaxdamp.cli.options import Call
-from jaxdamp.cli.vehicle_words import (
-    law_of,
-    parse_vehicle,
-    read_baseline,
-    read_law,
-    with_dampers_at,
-)
+from jaxdamp.cli.vehicle_words import law_of, parse_vehicle, read_baseline, read_law, with_dampers_at
 from jaxdamp.dampers import AbstractDamper, command_words
-from jaxdamp.parameters import match_paths, named_parameters
 from jaxdamp.report import Table, axles_sentence, notes_of, ride_report, ride_tables, ride_verdict
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Response
@@ -125,9 +119,9 @@ def beyond_vehicles(car: AbstractVehicle, over: Mapping[str, np.ndarray]) -> lis
     >>> beyond_vehicles(vehicles.presets.quarter_car_000(), {"damper.rate": np.array([1500.0, 1e300])})
     ['unusual: 1 of 2 values of damper.rate is beyond what vehicles have (up to 1e+06 N s/m), such as 1e+300.']
     """
-    units, notes = {p.path: p.unit for p in named_parameters(car, over)}, []
+    notes = []
     for name, values in over.items():
-        unit = units[match_paths([*units], [name])[0]]
+        unit = unit_of(name, over, car)
         least, most = USUAL_SIZES.get(unit, (0.0, np.inf))
         size = np.abs(values)
         beyond = values[(size > most) | ((size > 0.0) & (size < least))]
@@ -176,17 +170,9 @@ def ride(
     screen.points(commands)
     screen.points(unusual(road, driving.speed), style="yellow")
     with job(screen, "ride", output) as work:
-        responses: dict[str, Response] = {}
         remarks: list[str] = []
-        with screen.stage("Driving", total=len(cars)) as advance:
-            for done, (name, car) in enumerate(cars.items()):
-                advance(name, done)
-                with without_range_warnings():
-                    responses[name], warned = with_step_warnings(
-                        lambda car=car: simulate(car, surface, **how.arguments(**run))
-                    )
-                remarks += [f"{name}: {text}" for text in warned]
-            remarks += notes_of(dict(reversed(responses.items())))
+        responses = driven(screen, cars, lambda car: simulate(car, surface, **how.arguments(**run)), remarks.extend)
+        remarks += notes_of(dict(reversed(responses.items())))
         tables = show_ride(screen, responses)
         screen.remarks(remarks, style="yellow")
         axles = axles_sentence(responses)
@@ -199,6 +185,23 @@ def ride(
             write_tables(draft, tables)
             plots.animation(responses, draft / "animation.html", title=title)
         work.page(ride_report, responses, title=title, laws=laws, remarks=[*commands, *remarks])
+
+
+def driven(
+    screen: Screen,
+    cars: Mapping[str, AbstractVehicle],
+    drive: Callable[[AbstractVehicle], Response],
+    say: Callable[[list[str]], None],
+    title: str = "Driving",
+) -> dict[str, Response]:
+    """Each vehicle on a road; what its run warns of the step is said at once."""
+    responses: dict[str, Response] = {}
+    with screen.stage(title, total=len(cars)) as advance:
+        for name, car in cars.items():
+            advance(name, len(responses))
+            responses[name], warned = with_step_warnings(lambda car=car: drive(car))
+            say([f"{name}: {text}" for text in warned])
+    return responses
 
 
 def at_commands(cars: Mapping[str, AbstractVehicle]) -> list[str]:
@@ -216,13 +219,13 @@ def show_ride(screen: Screen, responses: Mapping[str, Response]) -> dict[str, Ta
     return tables
 
 
-def headline(screen: Screen, table: Table, vehicle: AbstractVehicle, more: Collection[str] = ()) -> Table:
-    """Comfort, travel and grip of a vehicle, and further metrics, out of a table of all; all if the terminal is to."""
-    names = {row[0] for row in table.rows}
+def headline(screen: Screen, table: Table, vehicle: AbstractVehicle) -> Table:
+    """Comfort, travel and grip of a vehicle out of a table of all metrics; all if the terminal is to."""
+    names, shown = {row[0] for row in table.rows}, set[str]()
     for goal in GOALS:
         driven, stationary = (vehicle.goal_metrics(goal, white=white) for white in (False, True))
-        more = {*more, *(driven if names & {*driven} else stationary)}
-    return table if screen.verbose else table.only(more)
+        shown |= {*(driven if names & {*driven} else stationary)}
+    return table if screen.verbose else table.only(shown)
 
 
 def _write(folder: Path, laws: Mapping[str, AbstractDamper], responses: Mapping[str, Response]) -> None:

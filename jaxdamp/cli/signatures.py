@@ -20,24 +20,14 @@ _ENTRY = re.compile(r"^    ([\w, ]+): (.*(?:\n     .*)*)", re.M)
 
 
 class Argument(NamedTuple):
-    """An argument of a function, or a field of a class of options.
+    """An argument of a function, or a field of a class of options."""
 
-    Attributes:
-        name: of the argument.
-        kinds: the alternatives of its annotation but for None: `"float"`, `"Mapping[str, str]"`, or the dotted name of
-            a class of this package.
-        default: its default; `REQUIRED` without one, an ellipsis if it is an expression.
-        text: what the docstring says of it.
-        positional: whether it stands before the star of the signature.
-        callee: the function or class whose arguments it holds, of `Annotated[Call, "bench.read"]`; empty for others.
-    """
-
-    name: str
-    kinds: tuple[str, ...]
-    default: object
-    text: str
-    positional: bool = False
-    callee: str = ""
+    name: str  # of the argument
+    kinds: tuple[str, ...]  # of its annotation, but for None: "float", or the dotted name of a class of this package
+    default: object  # `REQUIRED` without one, an ellipsis if it is an expression
+    text: str  # what the docstring says of it
+    positional: bool = False  # whether it stands before the star of the signature
+    callee: str = ""  # the function or class whose arguments it holds, of `Annotated[Call, "bench.read"]`
 
 
 @cache

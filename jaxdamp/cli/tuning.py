@@ -57,11 +57,7 @@ def swept(
     file: Path | None,
     part: str | None = None,
 ) -> tuple[Dataset, list[str]]:
-    """The results of a sweep with what it warns of.
-
-    Raises:
-        ValueError: a store of another sweep, with the options that differ.
-    """
+    """The results of a sweep with what it warns of."""
     stored = file if file is not None and file.suffix == ".zarr" else None
     now = resuming.given_now()
     with screen.stage("Driving") as advance, warnings.catch_warnings(record=True) as caught:
@@ -200,14 +196,7 @@ def write_tuning(folder: Path, result: TuneResult) -> None:
     export.to_json(result.vehicle, folder / "vehicle.json")
     if isinstance(result.vehicle, Controlled) and not isinstance(result.vehicle.policy, dict):
         export.to_json(result.vehicle.policy, folder / "controller.json")
-    tables = {"parameters": result.parameter_table(), "metrics": result.table()}
-    if result.scenarios is not None:
-        tables["scenarios"] = result.scenario_table()
-    if result.fresh is not None:
-        tables["fresh_roads"] = result.fresh.table()
-    if result.combinations is not None:
-        tables["combinations"] = result.combinations.table()
-    write_tables(folder, tables)
+    write_tables(folder, result.tables() | ({} if result.fresh is None else {"fresh_roads": result.fresh.table()}))
     write_json(folder / "tuning.json", result.to_dict())
 
 

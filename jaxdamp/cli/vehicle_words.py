@@ -30,15 +30,10 @@ def presets() -> dict[str, Callable[..., AbstractVehicle]]:
     return {name: make for name, make in functions if "damper" in inspect.signature(make).parameters}
 
 
-def vehicles_table() -> Table:
-    """The published vehicles that take a damper, with a line of meaning."""
-    rows = tuple((name, (inspect.getdoc(make) or "").partition("\n")[0]) for name, make in presets().items())
-    return Table("Vehicles", (Column("vehicle"), Column("what it is")), rows)
-
-
 def list_vehicles(screen: Screen) -> None:
     """List the vehicles that a law can be put into."""
-    screen.table(vehicles_table())
+    rows = tuple((name, (inspect.getdoc(make) or "").partition("\n")[0]) for name, make in presets().items())
+    screen.table(Table("Vehicles", (Column("vehicle"), Column("what it is")), rows))
 
 
 def list_laws(screen: Screen) -> None:
@@ -55,9 +50,6 @@ def parse_vehicle(word: str) -> MakeCar:
 
         [parameters]
         sprung_mass = 1300.0
-
-    Raises:
-        ValueError: an unknown name, a file that is not there or holds no vehicle, parameters that the preset has not.
     """
     path = Path(word).expanduser()
     if path.suffix not in (".json", ".toml"):
@@ -83,11 +75,7 @@ def read_baseline(path: Path, car: AbstractVehicle) -> AbstractVehicle:
 
 
 def read_module(argument: str, path: Path, kinds: type[T] | tuple[type[T], ...], words: str, remedy: str = "") -> T:
-    """What a JSON file of `export.to_json` holds.
-
-    Raises:
-        ValueError: no such file, one that is not JSON, or that holds something else.
-    """
+    """What a JSON file of `export.to_json` holds."""
     read_json(argument, path, words, remedy)
     module = export.from_json(path)
     _checks.instance(argument, module, kinds, f"be {words} as JSON", remedy)
@@ -114,22 +102,14 @@ def _flat(values: Mapping[str, object], prefix: str = "") -> list[tuple[str, obj
 
 
 def with_law(vehicle: AbstractVehicle, law: AbstractDamper) -> AbstractVehicle:
-    """The vehicle with a law at each of its dampers, the laws whose path ends with "damper".
-
-    Raises:
-        ValueError: a vehicle without such a law.
-    """
+    """The vehicle with a law at each of its dampers, the laws whose path ends with "damper"."""
     for path in damper_places(vehicle):
         vehicle = eqx.tree_at(lambda car, path=path: get(car, path), vehicle, law)
     return vehicle
 
 
 def commanded(law: AbstractDamper, command: float | None) -> AbstractDamper:
-    """A law at the command of the option --command; at its own without one.
-
-    Raises:
-        ValueError: a law that takes no command, or not this one.
-    """
+    """A law at the command of the option --command; at its own without one."""
     if command is None:
         return law
     check_commands("command", law, command)
@@ -137,11 +117,7 @@ def commanded(law: AbstractDamper, command: float | None) -> AbstractDamper:
 
 
 def with_dampers_at(vehicle: AbstractVehicle, command: float | None) -> AbstractVehicle:
-    """The vehicle with its dampers that take a command at that of the option --command; itself without one.
-
-    Raises:
-        ValueError: no damper of the vehicle takes a command, or one not this one; a vehicle with a controller.
-    """
+    """The vehicle with its dampers that take a command at that of the option --command; itself without one."""
     if command is None:
         return vehicle
     if vehicle.passive is not vehicle:

@@ -71,11 +71,6 @@ CALLS = {
 """Calls of Python in the sentences of the library, as patterns, and what the command line says instead."""
 
 
-def option(argument: str) -> str:
-    """The option that sets an argument: "--force-sign" for "force_sign"."""
-    return f"--{argument.replace('_', '-')}"
-
-
 def option_text(setting: Setting, name: str = "") -> str:
     """An argument with its value as it is given on the command line.
 
@@ -84,7 +79,7 @@ def option_text(setting: Setting, name: str = "") -> str:
     >>> option_text(Setting("sampling_rate")), option_text(Setting("stroke_from_velocity", True))
     ('--sampling-rate ...', '--stroke-from-velocity')
     """
-    name = name or option(setting.argument)
+    name = name or f"--{setting.argument.replace('_', '-')}"
     if setting.value is True:
         return name
     if isinstance(setting.value, dict):

@@ -12,6 +12,7 @@ from jaxdamp.plots import _style
 
 A4 = (8.27, 11.69)  # inch
 SMALL = 7.5  # pt, of tables
+_MOST = 3  # remarks
 _TEXT: _style.Look = {"va": "top", "linespacing": 1.35}
 
 
@@ -85,11 +86,12 @@ def table(
             axes.text(place, y, cell, fontsize=SMALL, color=colour, ha=side, va="center")
 
 
-def remarks(axes: Axes, title: str, sentences: Sequence[str], *, width: int, none: str = "", most: int = 3) -> None:
-    """At most so many sentences under a title; the others are counted."""
+def remarks(axes: Axes, title: str, sentences: Sequence[str], *, width: int, none: str = "") -> None:
+    """The first sentences under a title; the others are counted."""
     blank(axes)
-    shown = [textwrap.shorten(_style.said(display().words(s)), 3 * width, placeholder=" …") for s in sentences[:most]]
+    said = [_style.said(display().words(sentence)) for sentence in sentences[:_MOST]]
+    shown = [textwrap.shorten(sentence, 3 * width, placeholder=" …") for sentence in said]
     lines = [line for s in shown or [none] for line in textwrap.wrap(s, width, subsequent_indent="   ")]
-    lines += [f"and {len(sentences) - most} more on the page"] * (len(sentences) > most)
+    lines += [f"and {len(sentences) - _MOST} more on the page"] * (len(sentences) > _MOST)
     axes.text(0.0, 1.0, title, **_TEXT)
     axes.text(0.0, 0.86, "\n".join(lines), fontsize=SMALL, **_TEXT)

@@ -148,6 +148,12 @@ def quantity(value: float, unit: str) -> str:
     return f"{short(shown(factor * value))} {typeset_unit(shown.unit)}".rstrip()
 
 
+def labelled(words: str, unit: str) -> str:
+    """The label of an axis: words with their unit, if there is one."""
+    unit = typeset_unit(unit)
+    return f"{words} [{unit}]" if unit else words
+
+
 def percent(value: float, digits: int = 0) -> str:
     """A change with its sign: "−14 %"; zero has none."""
     text = f"{value:+.{digits}f}"
@@ -167,16 +173,13 @@ def _short_tick(value: float, _: int | None) -> str:
     return short(value)
 
 
-def label_ends(
-    axes: Axes, lines: Sequence["matplotlib.lines.Line2D"], gap: float = 0.05, *, outside: bool = False
-) -> None:
-    """The label of each line at its right end, in its colour, moved apart where labels would meet: no legend.
+_GAP = 0.05  # of two labels of curves, as a share of the height of the axes
 
-    Arguments:
-        axes: with its limits set.
-        lines: whose labels to write.
-        gap: smallest distance of two labels, as a share of the height of the axes.
-        outside: beside the axes, also where a line ends before.
+
+def label_ends(axes: Axes, lines: Sequence["matplotlib.lines.Line2D"], *, outside: bool = False) -> None:
+    """The label of each line at its right end, in its colour, on axes with limits: no legend.
+
+    Labels that would meet are moved apart. With `outside` they are beside the axes, also where a line ends before.
     """
     ends = []
     for line in lines:
@@ -187,7 +190,7 @@ def label_ends(
             ends.append((*shares[np.argmax(shares[:, 0])], line))
     place = -np.inf
     for x, y, line in sorted(ends, key=lambda end: end[1]):
-        place = max(min(y, 1.0), place + gap)
+        place = max(min(y, 1.0), place + _GAP)
         look = {"color": line.get_color(), "fontsize": "small", "va": "center", "annotation_clip": False}
         to = (1.0 if outside else min(x, 1.0)) + 0.015, place
         axes.annotate(str(line.get_label()), to, xycoords="axes fraction", **look)
@@ -218,15 +221,12 @@ def cross(axes: Axes, horizontal: bool = True, vertical: bool = True) -> None:
 
 
 def legend_beside(
-    figure: Figure,
-    handles: Sequence[Artist],
-    title: str = "",
-    place: Literal["upper", "lower"] = "upper",
+    figure: Figure, handles: Sequence[Artist], title: str = "", place: Literal["upper", "lower"] = "upper"
 ) -> None:
     """A legend to the right of all axes, never over data."""
     _in_words(handles)
-    where = "outside right upper" if place == "upper" else "outside right lower"
-    figure.legend(handles=list(handles), loc=where, frameon=False, title=title or None, alignment="left")
+    look: Look = {"loc": f"outside right {place}", "frameon": False, "alignment": "left"}
+    figure.legend(handles=list(handles), title=title or None, **look)
 
 
 _LETTERS = 9  # in an inch of a legend, with room for narrower figures
@@ -253,9 +253,6 @@ def by_name(
     """One object to draw, or several by name, as a dictionary; `alone` names a single one.
 
     `words` are those of the class, such as "a damper law".
-
-    Raises:
-        ValueError: none, or objects of another kind.
     """
     items = dict(given) if isinstance(given, Mapping) else {alone: given}
     if not items:

@@ -20,8 +20,8 @@ from jaxdamp.bench import BenchRun, ForceVelocityTable, as_runs, last_steady_cyc
 from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
 from jaxdamp.identify import Band
 from jaxdamp.parameters import FreeParameters, free_parameters
-from jaxdamp.plots import _style, fitted_range
-from jaxdamp.rig import march, quasi_static
+from jaxdamp.plots import _sheet, _style, fitted_range
+from jaxdamp.rig import march
 
 
 _MOST_LABELS = 10  # at the ends of curves
@@ -121,12 +121,9 @@ def draw_laws(
     handles, gaps = [], []
     styles = _style.design_styles(list(laws), baseline)
     for name, law in laws.items():
-        curve = quasi_static(law, velocities)
-        gaps += [f"{name}: {curve.note}"] if curve.note else []
-        label = _style.in_words(name) + " (settled)" * bool(law.initial_state().size)
-        style = styles[name]
-        force = np.asarray(curve.force)
-        handles += fitted_range.curve(axes, law, velocities, force, label=label, **style)
+        label, style = _style.in_words(name) + " (settled)" * bool(law.initial_state().size), styles[name]
+        lines, remarks = fitted_range.settled(axes, law, velocities, name, label=label, **style)
+        handles, gaps = handles + lines, gaps + remarks
         if name in bands:
             band, label = bands[name], f"{_style.in_words(name)}, 95 %"
             shade = {"color": style["color"], "alpha": 0.25, "linewidth": 0.0, "zorder": 2.0, "label": label}
@@ -149,20 +146,9 @@ def _measured(axes: Axes, runs: Sequence[BenchRun]) -> list:
     velocity, force = np.concatenate([cycle[:, :: max(cycle.shape[1] // 400, 1)] for cycle in cycles], axis=1)
     cloud = axes.plot(velocity, force, ".", color="0.58", markersize=2.0, label="measured, last cycles", zorder=0)
     peaks = peak_velocity_points(runs)
-    rings = axes.plot(
-        peaks.velocity.ravel(),
-        peaks.force.ravel(),
-        "o",
-        color=_style.BLACK,
-        markerfacecolor="white",
-        markersize=4.5,
-        label="measured at peak velocity",
-        zorder=3,
-    )
-    return [*cloud, *rings]
-
-
-A4 = (8.27, 11.69)  # inch
+    look: _style.Look = {"color": _style.BLACK, "markerfacecolor": "white", "markersize": 4.5, "zorder": 3}
+    label = "measured at peak velocity"
+    return [*cloud, *axes.plot(peaks.velocity.ravel(), peaks.force.ravel(), "o", label=label, **look)]
 
 
 def force_velocity_family(table: ForceVelocityTable, *, page: bool = False) -> Figure:
@@ -176,7 +162,7 @@ def force_velocity_family(table: ForceVelocityTable, *, page: bool = False) -> F
         ValueError: something else.
     """
     _checks.instance("table", table, ForceVelocityTable, "be a force-velocity table", "Take `bench.read_table(path)`.")
-    figure = _style.new_figure(*(A4 if page else (9.5, 5.5)))
+    figure = _style.new_figure(*(_sheet.A4 if page else (9.5, 5.5)))
     axes, below = figure.subplots(2, height_ratios=(3, 2)) if page else (figure.subplots(), None)
     handles = []
     for index, curve in enumerate(table.curves):

@@ -16,7 +16,7 @@ from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Band, Comparison, FitResult, Rung
 from jaxdamp.plots import _sheet, _style, fitted_range
 from jaxdamp.plots.evaluation import both_directions, gas_and_friction_words, limit_bars
-from jaxdamp.plots.loops import spread
+from jaxdamp.plots.loops import closed_cycle, spread
 from jaxdamp.rig import quasi_static
 
 
@@ -149,11 +149,7 @@ def _facts(damper: _Damper) -> str:
 
 
 def _force_velocity(
-    axes: Axes,
-    damper: _Damper,
-    baseline: AbstractDamper | None,
-    band: Band | None,
-    limits: LimitCheck | None,
+    axes: Axes, damper: _Damper, baseline: AbstractDamper | None, band: Band | None, limits: LimitCheck | None
 ) -> None:
     """Points at peak velocity over loops, and the law."""
     reach = _MM * max(run.peak_velocity for run in damper.runs)
@@ -211,8 +207,7 @@ def _force_title(damper: _Damper) -> str:
 def _curve(axes: Axes, law: AbstractDamper, reach: float, label: str, style: Mapping) -> None:
     """A settled law over velocities in mm/s, dotted where it is extrapolated."""
     points = np.linspace(-1.05 * reach, 1.05 * reach, 401) / _MM
-    force = np.asarray(quasi_static(law, points).force)
-    drawn = fitted_range.curve(axes, law, points, force, label=label, **style)
+    drawn, _ = fitted_range.settled(axes, law, points, "", label=label, **style)
     for line in [*drawn, *[one for one in axes.get_lines()[-2:] if one not in drawn]]:
         if np.size(line.get_xdata()) == points.size:
             line.set_xdata(_MM * points)
@@ -267,8 +262,7 @@ def _loops(axes: Axes, damper: _Damper) -> None:
     shown = spread(damper.runs, _MOST_LOOPS)
     fitted = damper.expected
     for number, run in enumerate(shown):
-        cycle, colour = np.arange(len(run))[last_steady_cycle(run)], _style.graded(number, len(shown))
-        part = np.append(cycle, cycle[0])  # closed
+        part, colour = closed_cycle(run), _style.graded(number, len(shown))
         stroke, static = _MM * run.stroke[part], damper.static_of(run)
         force = run.force[part] - static
         broad: _style.Look = {"linewidth": 3.0, "alpha": 0.35} if fitted else {"linewidth": 1.2}
@@ -328,13 +322,10 @@ def _parameters(axes: Axes, damper: _Damper) -> None:
             factor, unit = (1e3, "ms") if e.unit == "s" else (shown.factor, typeset_unit(shown.unit, "–"))
             half = max(abs(end - e.value) for end in e.interval)  # the side that no edge of the range cuts
             value, error = rounded(factor * e.value, factor * half)
-            name = _style.path_words(e.name)
-            doubtful = bool(e.note)
-            text = (
-                f"{_style.short(factor * e.value)}  ({e.note})" if doubtful else f"{value} ± {error}".replace("-", "−")
-            )
-            rows.append([name, text, unit])
-            colours.append(_style.BAD if doubtful else _style.BLACK)
+            known = f"{value} ± {error}".replace("-", "−")
+            text = f"{_style.short(factor * e.value)}  ({e.note})" if e.note else known
+            rows.append([_style.path_words(e.name), text, unit])
+            colours.append(_style.BAD if e.note else _style.BLACK)
         title, headings = "Parameters, ± 95 %", ["", "value", "unit"]
     else:
         texts = damper.evaluation.settings_table().texts()

@@ -38,14 +38,8 @@ def ladder(comparison: Comparison | VehicleComparison) -> Figure:
     groups = [("fitted records", [r.rmse for r in rungs], -0.5 * thickness * held, _style.COLOURS[0])]
     if held:
         scores = [np.nan if r.held_out_rmse is None else r.held_out_rmse for r in rungs]
-        groups.append(
-            (
-                "held-out records" if comparison.held_out else "motion held out",
-                scores,
-                0.5 * thickness,
-                _style.COLOURS[1],
-            )
-        )
+        label = "held-out records" if comparison.held_out else "motion held out"
+        groups.append((label, scores, 0.5 * thickness, _style.COLOURS[1]))
     handles = []
     for label, values, shift, colour in groups:
         bars = axes.barh(rows + shift, values, thickness, color=colour, label=label)
@@ -100,10 +94,8 @@ def cross_validation(result: CrossValidation) -> Figure:
         folds = [fold for fold in result.folds if fold.group == group]
         rows = np.array([laws.index(fold.law) for fold in folds]) + 0.5 * ((number + 0.5) / count - 0.5)
         values = [fold.fit_percent for fold in folds]
-        colour = _style.COLOURS[number % len(_style.COLOURS)]
-        handles += axes.plot(
-            values, rows, "o", markersize=5, alpha=0.8, color=colour, label="all" if group is None else f"{group}"
-        )
+        colour, label = _style.COLOURS[number % len(_style.COLOURS)], "all" if group is None else f"{group}"
+        handles += axes.plot(values, rows, "o", markersize=5, alpha=0.8, color=colour, label=label)
     means = [result.fit_percent(law) for law in laws]
     handles += axes.plot(means, np.arange(len(laws)), "|", markersize=16, color=_style.BLACK, label="mean", mew=2)
     _style.dress(axes, "fit of the record held out [%]", "", "Each record held out in turn")
@@ -173,9 +165,7 @@ def profile(curve: ProfileCurve) -> Figure:
     figure = _style.new_figure(7.5, 4.5)
     axes = figure.subplots()
     best = float(curve.values[np.argmin(curve.cost)])
-    line = axes.plot(
-        curve.values, curve.cost, "o-", color=_style.COLOURS[0], markersize=3.5, label="others fitted again"
-    )
+    line = axes.plot(curve.values, curve.cost, "o-", color=_style.COLOURS[0], ms=3.5, label="others fitted again")
     half = max(curve.linear_interval[1] - best, best - curve.linear_interval[0])
     if np.isfinite(half) and half > 0:
         points = np.linspace(curve.values[0], curve.values[-1], 201)

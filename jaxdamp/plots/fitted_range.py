@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float
 from jaxdamp._types import Axes, Figure
 from jaxdamp.dampers import AbstractDamper, extrapolated
 from jaxdamp.plots import _style
+from jaxdamp.rig import quasi_static
 from jaxdamp.simulation import Response, range_sentences
 
 
@@ -28,15 +29,15 @@ def curve(axes: Axes, law: AbstractDamper, velocities: Points, force: Points, **
     return handles
 
 
-def shade(axes: Axes, laws: Iterable[AbstractDamper], velocities: Points, label: str = LABEL) -> list:
-    """Shade the velocities at which all laws are extrapolated; returns the handle for a legend.
+def settled(axes: Axes, law: AbstractDamper, velocities: Points, name: str, **style: object) -> tuple[list, list[str]]:
+    """The settled force of a law over velocity: handles as of `curve`, and a remark where it has a gap."""
+    found = quasi_static(law, velocities)
+    handles = curve(axes, law, velocities, np.asarray(found.force), **style)
+    return handles, [f"{name}: {found.note}"] if found.note else []
 
-    Arguments:
-        axes: over velocity.
-        laws: those drawn.
-        velocities: the points of the curves [m/s], increasing.
-        label: for the legend.
-    """
+
+def shade(axes: Axes, laws: Iterable[AbstractDamper], velocities: Points, label: str = LABEL) -> list:
+    """Shade the velocities [m/s], which increase, at which all laws are extrapolated; the handle for a legend."""
     masks = [mask for mask in (extrapolated(law, velocities) for law in laws) if mask.any()]
     outside = np.logical_and.reduce(masks) if masks else np.zeros(velocities.size, bool)
     spans = []

@@ -49,8 +49,7 @@ def fit_loops(result: FitResult, runs: BenchRun | Sequence[BenchRun] | None = No
     handles = []
     for index, (run, force) in enumerate(zip(shown, forces, strict=True)):
         colour = _style.graded(index, len(shown))
-        cycle = np.arange(len(run))[last_steady_cycle(run)]
-        part = np.append(cycle, cycle[0])  # closed
+        part = closed_cycle(run)
         velocity, stroke, measured, fitted = run.velocity[part], 1e3 * run.stroke[part], run.force[part], force[part]
         for axes, x in ((loops, velocity), (football, stroke)):
             axes.plot(x, measured, color=colour, linewidth=4.0, alpha=0.3, solid_capstyle="round")
@@ -58,8 +57,8 @@ def fit_loops(result: FitResult, runs: BenchRun | Sequence[BenchRun] | None = No
         residual = fitted - measured
         every = max(len(residual) // _MOST_POINTS, 1)
         over_velocity.plot(velocity[::every], residual[::every], ".", color=colour, markersize=2.5, alpha=0.6)
-        size = max(len(cycle) // _PHASES, 1)
-        phase = _block_means((run.time[cycle] - run.time[cycle[0]]) * run.frequency, size)
+        size = max((len(part) - 1) // _PHASES, 1)
+        phase = _block_means((run.time[part[:-1]] - run.time[part[0]]) * run.frequency, size)
         over_time.plot(phase, _block_means(residual[:-1], size), color=colour, linewidth=1.3)
         handles.append(Line2D([], [], color=colour, linewidth=2.0, label=f"{run.name} ({run.peak_velocity:.2g} m/s)"))
     label = "fitted − measured [N]"
@@ -109,8 +108,7 @@ def loops_by_law(comparison: Comparison, record: str | None = None) -> Figure:
     for axes, rung in zip(panels.flat, shown, strict=False):
         number, run = next(pair for pair in enumerate(rung.result.runs) if pair[1].name == name)
         force = rung.result.respond(tuple(rung.result.runs))[number]  # all at once, as they were compiled for the fit
-        cycle = np.arange(len(run))[last_steady_cycle(run)]
-        part = np.append(cycle, cycle[0])  # closed
+        part = closed_cycle(run)
         axes.plot(run.velocity[part], run.force[part], label="measured", **(_style.REFERENCE | {"linewidth": 3.0}))
         axes.plot(run.velocity[part], force[part], label="law", **_style.AFTER)
         best = ", recommended" * (rung is comparison.best)
@@ -145,6 +143,12 @@ def _title(result: FitResult, runs: Sequence[BenchRun], shown: Sequence[BenchRun
 def _block_means(values: Float[np.ndarray, " samples"], size: int) -> Float[np.ndarray, " blocks"]:
     """Means of successive samples, the remainder left out."""
     return values[: len(values) // size * size].reshape(-1, size).mean(axis=1)
+
+
+def closed_cycle(run: BenchRun) -> np.ndarray:
+    """The samples of the last full cycle, and the first of them again."""
+    cycle = np.arange(len(run))[last_steady_cycle(run)]
+    return np.append(cycle, cycle[0])
 
 
 def spread(runs: Sequence[BenchRun], most: int) -> list[BenchRun]:

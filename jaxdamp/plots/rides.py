@@ -11,7 +11,6 @@ from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Figure
 from jaxdamp.plots import _style, fitted_range
 from jaxdamp.plots.frequency import third_octaves, welch, whole_spectrum
-from jaxdamp.rig import quasi_static
 from jaxdamp.simulation import Response
 from jaxdamp.vehicles import ChannelKind, Layout
 
@@ -202,10 +201,9 @@ def damper_use(responses: Response | Mapping[str, Response], *, damper: str | No
         style, law = styles[name], laws[name]
         held = np.linspace(velocity.min(), velocity.max(), _POINTS)
         trace.plot(velocity, force, color=style["color"], linewidth=0.5, alpha=0.5)
-        curve = quasi_static(law, held)
-        gaps += [f"{name or 'law'}: {curve.note}"] if curve.note else []
-        force_held = np.asarray(curve.force)
-        handles += fitted_range.curve(trace, law, held, force_held, label=_style.in_words(name) or "law", **style)
+        label = _style.in_words(name) or "law"
+        lines, remarks = fitted_range.settled(trace, law, held, name or "law", label=label, **style)
+        handles, gaps = handles + lines, gaps + remarks
         for axes, weight in ((time_share, np.ones_like(velocity)), (energy_share, force * velocity)):
             share = np.histogram(velocity, edges, weights=weight)[0] / np.sum(weight)
             axes.step(middles, 100.0 * share, where="mid", **style)

@@ -104,13 +104,7 @@ def record_sensitivity(result: RecordSensitivity) -> Figure:
     return figure
 
 
-def _band(
-    figure: Figure,
-    axes: Axes,
-    result: Sensitivity,
-    damper: str,
-    metric: str,
-) -> None:
+def _band(figure: Figure, axes: Axes, result: Sensitivity, damper: str, metric: str) -> None:
     """One curve as a band, coloured by the effect of the force at each velocity."""
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import Normalize

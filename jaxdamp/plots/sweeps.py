@@ -21,6 +21,30 @@ BEST: _style.Look = {"linestyle": "", "clip_on": False, "zorder": 4.5} | _style.
 HATCHES = ("////", "\\\\\\\\", "xxxx", "....")
 
 
+class _End(NamedTuple):
+    """One end of a limit: values of a result above it, or below it, violate it."""
+
+    name: str
+    value: float
+    above: bool
+    label: str
+
+    def beyond(self, values: np.ndarray) -> np.ndarray:
+        """Where the limit is violated."""
+        return values > self.value if self.above else values < self.value
+
+
+class _Shown(NamedTuple):
+    """What all pictures of a sweep show."""
+
+    figure: Figure
+    plot: Axes
+    data: Dataset
+    metric: str
+    ends: Sequence[_End]
+    present: Mapping[str, float]
+
+
 def sweep(
     data: Dataset,
     metric: str,
@@ -67,9 +91,9 @@ def sweep(
     for name in spans:
         _checks.one_of("limits", name, names)
     known = {name: float(_checks.plain_number(f"present[{name!r}]", value)) for name, value in (present or {}).items()}
-    ends = _ends(data, spans)
     figure = _style.new_figure(7.0, 4.6)
     plot = figure.add_subplot()
+    shown = _Shown(figure, plot, data, metric, _ends(data, spans), known)
     over_axes = " and ".join(_words(data, name) for name in axes)
     idle = without_effect(data).get(metric, [])
     flat = f" (no effect of {' and '.join(_words(data, name) for name in idle)})" if idle else ""
@@ -78,11 +102,11 @@ def sweep(
     if against is not None:
         if (other := _grid_axes(data, against, "against")) != axes:
             _checks.refuse("against", f"be a result over {axes}", f"{against!r} over {other}")
-        _plane(figure, plot, data, metric, against, chosen, ends, known)
+        _plane(shown, against, chosen)
     elif len(chosen) == 1:
-        _curves(figure, plot, data, metric, chosen[0], others, ends, known)
+        _curves(shown, chosen[0], others)
     else:
-        _map(figure, plot, data, metric, chosen, ends, known)
+        _map(shown, chosen)
     return figure
 
 
@@ -117,17 +141,9 @@ def _grid_axes(data: Dataset, metric: str, argument: str = "metric") -> list[str
     return axes
 
 
-def _curves(
-    figure: Figure,
-    plot: Axes,
-    data: Dataset,
-    metric: str,
-    name: str,
-    others: list[str],
-    ends: Sequence["_End"],
-    present: Mapping[str, float],
-) -> None:
+def _curves(shown: _Shown, name: str, others: list[str]) -> None:
     """A curve over one axis, for each value of another; a cross at the foot where points failed."""
+    figure, plot, data, metric, ends, present = shown
     lines = data[metric].transpose(*others, name).values.reshape(-1, data.sizes[name])
     failed = data["failed"].transpose(*others, name).values.reshape(lines.shape)
     where = data[name].values
@@ -159,16 +175,9 @@ def _curves(
         figure.legend([mark], ["failed"], loc="outside upper right", frameon=False)
 
 
-def _map(
-    figure: Figure,
-    plot: Axes,
-    data: Dataset,
-    metric: str,
-    over: list[str],
-    ends: Sequence["_End"],
-    present: Mapping[str, float],
-) -> None:
+def _map(drawn: _Shown, over: list[str]) -> None:
     """Filled contours over two axes, the smallest value, lines of so much more; crosses where points failed."""
+    figure, plot, data, metric, ends, present = drawn
     x, y = (data[name].values for name in over)
     values, failed = (data[name].transpose(over[1], over[0]).values for name in (metric, "failed"))
     if min(values.shape) < 2:
@@ -223,20 +232,12 @@ def _widened(values: np.ndarray) -> tuple[float, float]:
     return float(values.min()) - more, float(values.max()) + more
 
 
-def _plane(
-    figure: Figure,
-    plot: Axes,
-    data: Dataset,
-    metric: str,
-    against: str,
-    over: list[str],
-    ends: Sequence["_End"],
-    present: Mapping[str, float],
-) -> None:
+def _plane(shown: _Shown, against: str, over: list[str]) -> None:
     """Points in the plane of two results, coloured by the first axis, and those that no other one beats in both."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
 
+    figure, plot, data, metric, ends, present = shown
     x, y = (data[name].transpose(*over).values.reshape(data.sizes[over[0]], -1) for name in (metric, against))
     beyond = [end.beyond(data[end.name].transpose(*over).values.reshape(x.shape)) for end in ends]
     forbidden = np.any(beyond, axis=0) if beyond else np.zeros(x.shape, bool)
@@ -276,19 +277,6 @@ def _more_than(plot: Axes, x: np.ndarray, y: np.ndarray, values: np.ma.MaskedArr
         plot.clabel(lines, fmt=dict(zip(heights, map(_style.percent, levels), strict=True)), fontsize="small")
 
 
-class _End(NamedTuple):
-    """One end of a limit: values of a result above it, or below it, violate it."""
-
-    name: str
-    value: float
-    above: bool
-    label: str
-
-    def beyond(self, values: np.ndarray) -> np.ndarray:
-        """Where the limit is violated."""
-        return values > self.value if self.above else values < self.value
-
-
 def _ends(data: Dataset, spans: Mapping[str, tuple[float, float]]) -> list[_End]:
     """The finite ends of limits, in words."""
     ends = []
@@ -318,9 +306,7 @@ def _hatch(plot: Axes, x: np.ndarray, y: np.ndarray, values: np.ndarray, end: _E
 
 def _label(data: Dataset, name: str) -> str:
     """A name in words with its unit."""
-    words = _words(data, name)
-    unit = typeset_unit(data[name].attrs.get("units", ""))
-    return f"{words} [{unit}]" if unit else words
+    return _style.labelled(_words(data, name), data[name].attrs.get("units", ""))
 
 
 def _words(data: Dataset, name: str) -> str:
@@ -331,5 +317,4 @@ def _words(data: Dataset, name: str) -> str:
 
 
 def _unit(data: Dataset, name: str) -> str:
-    unit = typeset_unit(data[name].attrs.get("units", ""))
-    return f" {unit}" if unit else ""
+    return f" {typeset_unit(data[name].attrs.get('units', ''))}".rstrip()

@@ -17,6 +17,9 @@ from jaxdamp.tune import ParetoFront, TuneResult, change_in_percent, limit_spans
 from jaxdamp.vehicles import AbstractVehicle
 
 
+_FASTEST = "peak_damper_velocity"  # the metric, if the vehicle reports it
+
+
 def tuning(result: TuneResult, velocities: VectorLike | None = None) -> Figure:
     """Force over velocity of each damper and response spectra before and after, and the change of each ride metric.
 
@@ -27,10 +30,7 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> Figure:
     """
     remedy = "The call is `tuning(result)` with the result of `tune.minimise`."
     _checks.instance("result", result, TuneResult, "be the result of a tuning", remedy)
-    if velocities is None:
-        peaks = [table.get("peak_damper_velocity", 0.0) for table in (result.before, result.after)]
-        reach = 1.1 * max(peaks) or 1.0
-        velocities = np.linspace(-reach, reach, 401)
+    points = _velocities(velocities, [side.get(_FASTEST, 0.0) for side in (result.before, result.after)])
     pairs = _changed(result)
     spectra = result.spectra(default_channels(result.start.layout))
     height = max(6.0, 0.38 * len(result.before))  # a line of text for each metric
@@ -42,7 +42,7 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> Figure:
         below = rows[1].subgridspec(1, len(spectra))
         for place, (channel, pair) in enumerate(spectra.items()):
             _spectrum(figure.add_subplot(below[place]), channel, result.start.units[channel], pair)
-    points, beside, gaps = np.asarray(velocities, dtype=float), grid[0].subgridspec(len(pairs), 1), []
+    beside, gaps = grid[0].subgridspec(len(pairs), 1), []
     for place, (name, pair) in enumerate(pairs.items()):
         gaps += _law(figure.add_subplot(beside[place]), name, pair, points)
     verdict = result.verdict
@@ -54,13 +54,17 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> Figure:
     return figure
 
 
+def _velocities(given: VectorLike | None, peaks: Sequence[float] | np.ndarray) -> np.ndarray:
+    """The velocities at which laws are drawn; a little beyond the fastest motion, if it is known, if none are given."""
+    reach = 1.1 * float(np.max(peaks)) or 1.0
+    return np.linspace(-reach, reach, 401) if given is None else np.asarray(given, dtype=float)
+
+
 def _law(curves: Axes, name: str, pair: tuple[AbstractDamper, AbstractDamper], points: np.ndarray) -> list[str]:
     """A law before and after over the velocity; a sentence for each that has no settled force somewhere."""
     gaps = []
     for law, when, style in zip(pair, ("before", "after"), (_style.BEFORE, _style.AFTER), strict=True):
-        settled = quasi_static(law, points)
-        gaps += [f"{name} {when}: {settled.note}"] if settled.note else []
-        fitted_range.curve(curves, law, points, np.asarray(settled.force), label=when, **style)
+        gaps += fitted_range.settled(curves, law, points, f"{name} {when}", label=when, **style)[1]
     fitted_range.shade(curves, pair, points)
     _style.dress(curves, _style.VELOCITY, _style.FORCE, name)
     _style.cross(curves)
@@ -175,7 +179,8 @@ def _points(axes: Axes, front: ParetoFront, x: str, y: str, marked: Mapping[str,
         look = mark | (_style.PRESENT if i == 0 else {})
         handles += axes.plot(values[x], values[y], label=_style.in_words(name), linestyle="", zorder=4, **look)
     handles += _limits(axes, front, x, y)
-    _style.dress(axes, _label(front, x), _label(front, y), f"Front of {len(front)} designs")
+    across_label, up_label = (_style.labelled(_style.metric_words(name), front.units[name]) for name in (x, y))
+    _style.dress(axes, across_label, up_label, f"Front of {len(front)} designs")
     return handles
 
 
@@ -186,9 +191,8 @@ def _limits(axes: Axes, front: ParetoFront, x: str, y: str) -> list[Artist]:
         for end in (lower, upper):
             if not np.isfinite(end):
                 continue
-            words = (
-                f"limit of {_style.metric_words(name)}, {_style.short(end)} {typeset_unit(front.units[name])}".rstrip()
-            )
+            size = f"{_style.short(end)} {typeset_unit(front.units[name])}".rstrip()
+            words = f"limit of {_style.metric_words(name)}, {size}"
             if name in (x, y):
                 line = axes.axvline if name == x else axes.axhline
                 handles.append(line(end, color=colour, linestyle="--", linewidth=1.2, label=words))
@@ -196,11 +200,6 @@ def _limits(axes: Axes, front: ParetoFront, x: str, y: str) -> list[Artist]:
                 marks = front.values[x][at_limit], front.values[y][at_limit]
                 handles.append(axes.scatter(*marks, 60.0, colour, marker="|", linewidths=1.8, label=f"at the {words}"))
     return handles
-
-
-def _label(front: ParetoFront, name: str) -> str:
-    words, unit = _style.metric_words(name), typeset_unit(front.units[name])
-    return f"{words} [{unit}]" if unit else words
 
 
 def _laws_along(front: ParetoFront) -> dict[str, list[AbstractDamper]]:
@@ -211,18 +210,10 @@ def _laws_along(front: ParetoFront) -> dict[str, list[AbstractDamper]]:
 
 
 def _curves(
-    axes: Axes,
-    front: ParetoFront,
-    laws: list[AbstractDamper],
-    title: str,
-    velocities: VectorLike | None,
+    axes: Axes, front: ParetoFront, laws: list[AbstractDamper], title: str, velocities: VectorLike | None
 ) -> None:
     """Force over velocity of the laws at some points of the front, the knee among them."""
-    if velocities is None:
-        peaks = front.values.get("peak_damper_velocity", np.zeros(1))
-        reach = 1.1 * float(np.max(peaks)) or 1.0
-        velocities = np.linspace(-reach, reach, 401)
-    points = np.asarray(velocities, dtype=float)
+    points = _velocities(velocities, front.values.get(_FASTEST, np.zeros(1)))
     shown = {*np.linspace(0, len(laws) - 1, min(MOST_CURVES, len(laws))).astype(int).tolist(), front.knee}
     shades = front.shares[:, 0]
     for i in sorted(shown):

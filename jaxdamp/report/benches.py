@@ -46,12 +46,8 @@ def records_table(runs: Sequence[BenchRun], held_out: Sequence[BenchRun] = ()) -
         runs: the records.
         held_out: those of them that are not fitted.
     """
-    columns = [
-        Column("record"),
-        Column("sampling", "Hz"),
-        Column("frequency", "Hz", ".3g"),
-        Column("amplitude", "mm", ".3g"),
-    ]
+    columns = [Column("record"), Column("sampling", "Hz")]
+    columns += [Column("frequency", "Hz", ".3g"), Column("amplitude", "mm", ".3g")]
     columns += [Column("peak velocity", "m/s", ".3g"), Column("least force", "N", ".0f")]
     columns += [Column("largest force", "N", ".0f"), Column("work per cycle", "J", ".3g"), Column("cycles")]
     columns += [Column("use")] if held_out else []

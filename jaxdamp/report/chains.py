@@ -73,8 +73,11 @@ def chain_report(
     )
     fits = FitPart(comparison, page["runs"], sheets, evaluation, preflight, page["remarks"], baseline)
     report.include(fits.drawn(report.attempts, None if page["folder"] is None else {}) if laws is None else laws())
-    if sheets:
-        _add_ride_sheet(report, rides, tuned)
+    if sheets and tuned is not None:
+        report.sheet(lambda: tuned.plot("sheet"), tuned.verdict.sentence, "ride_sheet")
+    elif sheets and rides:
+        road, ride = next(iter(rides.items()))
+        report.sheet(lambda: plots.ride_sheet(ride, name=road), ride_verdict(ride)[-1], "ride_sheet")
     for number, (road, ride) in enumerate(rides.items(), 1):
         report.heading(f"Ride: {road}")
         report.points(notes_of(ride))
@@ -133,15 +136,6 @@ class FitPart(NamedTuple):
 def _shown(shown: Display, part: FitPart, attempts: Attempts | None) -> Report:
     with shown_in(shown):
         return part.drawn(attempts, {})
-
-
-def _add_ride_sheet(report: Report, rides: Mapping[str, Mapping[str, Response]], tuned: TuneResult | None) -> None:
-    """The tuning or the first ride on one page."""
-    if tuned is not None:
-        report.sheet(lambda: tuned.plot("sheet"), tuned.verdict.sentence, "ride_sheet")
-    elif rides:
-        road, ride = next(iter(rides.items()))
-        report.sheet(lambda: plots.ride_sheet(ride, name=road), ride_verdict(ride)[-1], "ride_sheet")
 
 
 _PAGES: dict[type, Callable[..., Report]] = {

@@ -52,16 +52,6 @@ def add_findings(report: Report, result: FitResult) -> None:
         )
 
 
-def add_validation(report: Report, validation: CrossValidation) -> None:
-    """Each record, predicted by a fit to the others."""
-    report.heading("Records predicted by fits without them")
-    report.text(
-        f"Each record was left out once and predicted by {validation.best} fitted to the others: mean fit"
-        f" {validation.fit_percent(validation.best):.1f} %, RMSE {validation.rmse(validation.best):.1f} N."
-    )
-    report.table(validation.record_table())
-
-
 MOST_CURVES = 5  # laws in one picture of force over velocity
 BASELINE = "baseline"  # name of a law to compare with
 BAND_STEP = 10  # points of a curve from one of its band to the next
@@ -119,7 +109,13 @@ def fit_report(
     add_records(report, records, comparison.held_out, page["remarks"], preflight)
     add_fits(report, comparison, failures, baseline)
     if validation is not None:
-        add_validation(report, validation)
+        best_law = validation.best
+        report.heading("Records predicted by fits without them")
+        report.text(
+            f"Each record was left out once and predicted by {best_law} fitted to the others: mean fit"
+            f" {validation.fit_percent(best_law):.1f} %, RMSE {validation.rmse(best_law):.1f} N."
+        )
+        report.table(validation.record_table())
     return report
 
 
@@ -271,10 +267,8 @@ def _with_curves(report: Report, laws: Mapping[str, AbstractDamper], points: np.
     """The laws to draw, whose force at constant velocity can be computed, and the rest."""
     sound: dict[str, AbstractDamper] = {}
     for name, law in laws.items():
-        if len(sound) < MOST_CURVES:
-            with report.part(f"The curve of {name} in force_velocity.png"):
+        with report.part(f"The curve of {name} in force_velocity.png"):
+            if len(sound) < MOST_CURVES:
                 rig.quasi_static(law, points)
-                sound[name] = law
-        else:
             sound[name] = law
     return sound

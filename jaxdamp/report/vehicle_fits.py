@@ -17,12 +17,7 @@ from jaxdamp.report.page import PAGE, Page, Report
 
 
 @with_defaults(PAGE, title="Vehicle fitted to records of its motion")
-def vehicle_fit_report(
-    result: VehicleFit,
-    *,
-    remarks: Sequence[str] | None = None,
-    **page: Unpack[Page],
-) -> Report:
+def vehicle_fit_report(result: VehicleFit, *, remarks: Sequence[str] | None = None, **page: Unpack[Page]) -> Report:
     """A page on the fit of a vehicle.
 
     Arguments:

@@ -15,11 +15,9 @@
 
 from jaxdamp._guesses import answer_old_names
 from jaxdamp._status import Status as Status
-from jaxdamp.tune.changes import change_in_percent as change_in_percent
 from jaxdamp.tune.decisions import DamperComparison as DamperComparison, compare_dampers
-from jaxdamp.tune.fresh_limits import half_interval as half_interval
 from jaxdamp.tune.front import ParetoFront as ParetoFront, hypervolume as hypervolume
-from jaxdamp.tune.limits import Limits as Limits, limit_spans as limit_spans
+from jaxdamp.tune.limits import Limits as Limits, half_interval as half_interval, limit_spans as limit_spans
 from jaxdamp.tune.minimising import minimise
 from jaxdamp.tune.objective import Targets, smooth_peak, smooth_settling
 from jaxdamp.tune.pareto_search import pareto
@@ -35,7 +33,7 @@ from jaxdamp.tune.settings import Design, Run, Search
 from jaxdamp.tune.shape import damper_paths as damper_paths, knee, monotone, ratio, slope
 from jaxdamp.tune.valving_result import ValvingResult as ValvingResult
 from jaxdamp.tune.valving_search import valving
-from jaxdamp.tune.verdict import Outcome as Outcome
+from jaxdamp.tune.verdict import Outcome as Outcome, change_in_percent as change_in_percent
 
 
 __all__ = [

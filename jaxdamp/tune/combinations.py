@@ -8,30 +8,21 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from jaxdamp._tables import Column, Contents, Table, plain
-from jaxdamp.tune.changes import relative_change
 from jaxdamp.tune.rescoring import Rescore
+from jaxdamp.tune.verdict import relative_change
 
 
 @final
 @dataclasses.dataclass(frozen=True)
 class Combinations:
-    """All combinations of choices, the best first: those within the limits, then those least beyond them.
+    """All combinations of choices, the best first: those within the limits, then those least beyond them."""
 
-    Attributes:
-        choices: the values of each number, in its unit, by its name.
-        metrics: of each combination, by name.
-        met: which combinations meet all limits.
-        units: of numbers and metrics.
-        impossible: number of further combinations, which the vehicle cannot have: the law refuses them.
-        beside_next: by how much the best differs from the next best, in words; empty where there is none.
-    """
-
-    choices: dict[str, Float[np.ndarray, " combinations"]]
-    metrics: dict[str, Float[np.ndarray, " combinations"]]
-    met: Bool[np.ndarray, " combinations"]
-    units: Mapping[str, str]
-    impossible: int = 0
-    beside_next: str = ""
+    choices: dict[str, Float[np.ndarray, " combinations"]]  # the values of each number, in its unit, by its name
+    metrics: dict[str, Float[np.ndarray, " combinations"]]  # of each combination, by name
+    met: Bool[np.ndarray, " combinations"]  # which combinations meet all limits
+    units: Mapping[str, str]  # of numbers and metrics
+    impossible: int = 0  # number of further combinations, which the vehicle cannot have: the law refuses them
+    beside_next: str = ""  # by how much the best differs from the next best, in words; empty where there is none
 
     @property
     def sentence(self) -> str:
@@ -67,13 +58,7 @@ class Combinations:
 
 
 def beside_next(combinations: Combinations, metric: str, fresh: Rescore | None) -> str:
-    """By how much the best combination differs from the next best, in words.
-
-    Arguments:
-        combinations: all of them.
-        metric: the minimised one.
-        fresh: the next best and the best on fresh roads, if there are any.
-    """
+    """By how much the best combination differs from the next best in the minimised metric, in words."""
     if fresh is None:
         values = combinations.metrics[metric]
         change = relative_change(values[1], values[0])

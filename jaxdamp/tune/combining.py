@@ -21,12 +21,7 @@ from jaxdamp.vehicles import AbstractVehicle
 
 @final
 class Driven:
-    """All combinations of the choices of a tuning, in place of a descent.
-
-    Attributes:
-        task: of the evaluator.
-        ends: a search that ends at each of them.
-    """
+    """All combinations of the choices of a tuning, in place of a descent: a search that ends at each of them."""
 
     def __init__(
         self, evaluator: Evaluator, points: np.ndarray, impossible: int, progress: Callable[[int, float], None]
@@ -48,11 +43,7 @@ class Driven:
         return [ended]
 
     def combinations(self, limits: Sequence[Limit]) -> Combinations:
-        """All of them for the result, with the minimised and the limited metrics.
-
-        Arguments:
-            limits: of the search.
-        """
+        """All of them for the result, with the minimised and the limited metrics."""
         task, ranks = self.task, [rank(self.task, one, limits) for one in self.ends]
         order = sorted(range(len(ranks)), key=lambda i: ranks[i])
         ends = [self.ends[i] for i in order]
@@ -69,15 +60,7 @@ class Driven:
 
 
 def every_combination(evaluator: Evaluator, progress: Callable[[int, float], None]) -> Driven | None:
-    """All combinations that the vehicle can have, driven, if choices are all that is free and there are not too many.
-
-    Arguments:
-        evaluator: of the task.
-        progress: called with the number of combinations driven and the least objective so far.
-
-    Raises:
-        ValueError: choices of which the vehicle can have no combination.
-    """
+    """All combinations that the vehicle can have, driven, if choices are all that is free and not too many."""
     space = evaluator.task.space
     choices = [choice.values for choice in space.choices if choice is not None]
     if len(choices) < len(space.choices) or math.prod(map(len, choices)) > MOST_COMBINATIONS:

@@ -29,11 +29,7 @@ class Ended(NamedTuple):
 
 @final
 class Descent:
-    """Searches for the smallest value of one objective, side by side.
-
-    Attributes:
-        task: of the evaluator.
-    """
+    """Searches for the smallest value of one objective, side by side."""
 
     def __init__(self, evaluator: Evaluator, max_steps: int, progress: Callable[[int, float], None]) -> None:
         self.task, self._evaluator, self._max_steps, self._progress = evaluator.task, evaluator, max_steps, progress

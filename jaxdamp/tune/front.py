@@ -14,10 +14,10 @@ from jaxdamp._tables import Column, Contents, Table, plain, typeset_unit, with_u
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import MetricValues
 from jaxdamp.parameters import FreeParameters
-from jaxdamp.tune.changes import relative_change
 from jaxdamp.tune.measuring import Measurement
 from jaxdamp.tune.result import V
 from jaxdamp.tune.scenario_ride import smooth_in_scenarios
+from jaxdamp.tune.verdict import relative_change
 from jaxdamp.vehicles import AbstractVehicle
 
 

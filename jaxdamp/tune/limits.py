@@ -1,19 +1,25 @@
-"""Hard limits of a tuning: on metrics, in every scenario, and on the shape of the force-velocity curve."""
+"""Hard limits of a tuning, on metrics in every scenario and on the shape of a curve; how they hold on fresh roads."""
 
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
+from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._tables import typeset_unit
 from jaxdamp.metrics import Metric, current_name
 
 
+if TYPE_CHECKING:
+    from jaxdamp.tune.rescoring import Rescore
+
+
 EXAMPLE = "Write `{'working_space_peak_to_peak': 0.1}`, or `{...: (smallest, largest)}`."
 ENDS = "Write 0.1, or (-0.08, 0.1); None for an end without a limit, '+10%' for one relative to the start."
+WITHIN = 0.01  # relative excess over a limit on fresh roads up to which it counts as met
 PERCENT = re.compile(r"([+-]\d+(?:\.\d*)?) *%")
 End: TypeAlias = float | int | str | None  # of a limit: in its unit, or relative to the start; None for none
 Ends: TypeAlias = End | Sequence[End]  # the upper one, or both
@@ -62,7 +68,12 @@ class Limit(NamedTuple):
     def nearer(self, value: float) -> str:
         """The nearer end in words, such as "≤ 0.1 m"."""
         sign, end = ("≤", self.upper) if self.upper - value <= value - self.lower else ("≥", self.lower)
-        return f"{sign} {end:.4g} {typeset_unit(self.unit)}".rstrip()
+        return f"{sign} {amount(end, self.unit)}"
+
+
+def amount(value: float, unit: str) -> str:
+    """A value with its unit, such as "0.1 m"."""
+    return f"{value:.4g} {typeset_unit(unit)}".rstrip()
 
 
 def in_scenarios(name: str, scenarios: Sequence[str]) -> list[str]:
@@ -174,3 +185,53 @@ def limit_ends(limits: Iterable[Limit]) -> list[LimitEnd]:
 def margins(ends: Iterable[LimitEnd], values: Mapping[str, float | np.ndarray]) -> np.ndarray:
     """Relative distances to ends of limits, negative beyond them."""
     return np.array([end.sign * (end.value - values[end.name]) / end.scale for end in ends])
+
+
+def in_each(allowed: Mapping[str, LimitRange], scenarios: Sequence[str]) -> dict[str, LimitRange]:
+    """The ranges of limited metrics in every scenario, by the names of their values there."""
+    return {one: span for name, span in allowed.items() for one in in_scenarios(name, scenarios)}
+
+
+def lost_limits(fresh: "Rescore | None", allowed: Mapping[str, LimitRange]) -> dict[str, float]:
+    """The mean excess over limits that are broken on average over fresh roads, by more than the error of this mean.
+
+    The ranges are those in every scenario (`in_each`).
+    """
+    if fresh is None or fresh.roads < 2:
+        return {}
+    over = {name: excess(fresh, name, limit) for name, limit in allowed.items()}
+    return {name: float(np.mean(x)) for name, x in over.items() if np.mean(x) - half_interval(x) > WITHIN}
+
+
+def excess(fresh: "Rescore", name: str, allowed: LimitRange) -> Float[np.ndarray, " roads"]:
+    """Excess over a limit on each fresh road, relative to it, negative inside."""
+    over = []
+    for before, after in zip(fresh.before[name], fresh.after[name], strict=True):
+        lower, upper = allowed.at(float(before))
+        size = max(abs(end) for end in (lower, upper) if np.isfinite(end)) or 1.0
+        over.append(max(after - upper, lower - after) / size)
+    return np.array(over)
+
+
+def half_interval(values: Float[np.ndarray, " roads"], level: float = 0.95) -> float:
+    """Half the interval of the mean of independent values, by Student's distribution; infinite for one value.
+
+    Arguments:
+        values: one for each road.
+        level: of the interval.
+    """
+    from scipy.special import stdtrit
+
+    if len(values) < 2:
+        return np.inf
+    return float(stdtrit(len(values) - 1, 0.5 + 0.5 * level) * np.std(values, ddof=1) / np.sqrt(len(values)))
+
+
+def decided(fresh: "Rescore", allowed: Mapping[str, LimitRange]) -> bool:
+    """Whether further roads would change nothing: the sign of the gain and every limit are certain, or the error small.
+
+    It is asked again as roads are added, hence at 99 %.
+    """
+    offsets = [fresh.change(fresh.metric), *(excess(fresh, name, limit) - WITHIN for name, limit in allowed.items())]
+    halves = [half_interval(offset, 0.99) for offset in offsets]
+    return all(abs(np.mean(offset)) > half or half < WITHIN for offset, half in zip(offsets, halves, strict=True))

@@ -76,9 +76,7 @@ class Measurement(eqx.Module):
     @property
     def names(self) -> list[str]:
         """The names of all numbers: metrics, some of them in every scenario, and those of curves."""
-        names = list(self.objective.units(self.ride.vehicle))
-        entries = [entry for name in self.each_of for entry in self.entries(name) if entry not in names]
-        return [*names, *entries, *self.curves.names]
+        return list(dict.fromkeys([*self.objective.units(self.ride.vehicle), *self.limited_names]))
 
     @property
     def limited_names(self) -> list[str]:

@@ -1,28 +1,28 @@
 """`minimise`: tune the free parameters of a vehicle for a ride metric, by exact gradients."""
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Unpack
 
 import jax.numpy as jnp
 import numpy as np
 
+from jaxdamp._pieces import piece
 from jaxdamp._progress import Progress
 from jaxdamp._settings import with_defaults
 from jaxdamp._status import Status
-from jaxdamp._tables import typeset_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, MetricValues
 from jaxdamp.solve import Evaluation
 from jaxdamp.tune.combinations import Combinations, beside_next
 from jaxdamp.tune.combining import Driven, every_combination, rank
 from jaxdamp.tune.descending import Descent, Ended, missed, reached
-from jaxdamp.tune.fresh_limits import in_each, lost_limits
-from jaxdamp.tune.limits import Limit, LimitEnd, LimitRange, limit_ends
+from jaxdamp.tune.limits import Limit, LimitEnd, LimitRange, amount, decided, in_each, limit_ends, lost_limits
 from jaxdamp.tune.measuring import ride_on
 from jaxdamp.tune.objective import Function, check_objective
 from jaxdamp.tune.ranges import start_points
-from jaxdamp.tune.rescoring import Rescore, driver, on_fresh_roads
+from jaxdamp.tune.rescoring import Rescore, driver, other_roads, rescored
 from jaxdamp.tune.result import Attempt, Drive, ScenarioValues, TuneResult, V
 from jaxdamp.tune.scenario_ride import ScenarioRide
 from jaxdamp.tune.scenarios import Road, Scenarios
@@ -46,6 +46,7 @@ from jaxdamp.vehicles import AbstractVehicle
 
 OUTWARDS = 1e-3  # of what the search reached, by which a relaxed limit is beyond it
 SHARE = 0.01  # of the metric: the gain for which a relaxation is said
+FEWEST = 4  # fresh roads before their interval is looked at; then twice as many, and so on
 TIGHTENED = 2  # times that a search is repeated with limits that did not hold on fresh roads
 
 
@@ -258,7 +259,7 @@ def _on_fresh_roads(
     numbers: Sequence[int],
     allowed: Mapping[str, LimitRange],
 ) -> Rescore | None:
-    """Two designs, by their numbers, on other realisations of the road of a search, by its program."""
+    """Two designs on so many other realisations of the road that gain and limits are decided; None without any."""
     task, designs = evaluator.task, np.stack(sides)
     one, other = (task.space.free.build(jnp.asarray(side, task.space.free.values.dtype)) for side in sides)
     cars = one, other
@@ -270,8 +271,17 @@ def _on_fresh_roads(
     of_scenarios = isinstance(task.road, Scenarios)  # whose true risk counts, not a smooth one
     by_risk = driver(cars, task.objective.metrics, task.objective, task.run, list(task.allowed))
     drive = by_risk if of_scenarios else by_search
-    name = task.objective.name
-    return on_fresh_roads(drive, (cars, task.run), task.road, numbers, allowed, task.units, name)
+    name, others, driven = task.objective.name, other_roads(task.road, numbers), None
+    for first, last in itertools.pairwise([0, *(FEWEST * 2**i for i in range(len(numbers)))]):
+        part = others[first:last]
+        if not part:
+            break
+        what = ("fresh roads", cars, task.run, part, name, task.units, list(allowed))
+        new = piece(what, lambda part=part: rescored(drive, part, task.units, name, allowed))
+        driven = new if driven is None else driven.and_on(new)
+        if decided(driven, allowed):
+            break
+    return driven
 
 
 def _in_scenarios(
@@ -298,11 +308,6 @@ def _relaxation(task: DesignTask[V], ended: Ended, limits: tuple[Sequence[Limit]
     Where limits are not met: as far as the search came. At an optimum f within the limits, the Lagrange multiplier λ of
     a limit that holds it is its price −df/d(limit), and it must be relaxed by about 0.01 |f|/λ: said is the limit for
     which this is the smallest share of its scale. All places or scenarios of one limit are relaxed alike.
-
-    Arguments:
-        task: of the tuning.
-        ended: where the search ended.
-        limits: those of the task, and those of the search, which may be tighter.
     """
     ends, of = limit_ends(limits[0]), {limit.name: limit for limit in limits[0]}
     rows = ended.evaluation.rows
@@ -340,5 +345,4 @@ def _prices(task: DesignTask[V], ended: Ended, ends: Sequence[LimitEnd]) -> dict
 def _moved(limit: Limit, end: LimitEnd, to: float) -> str:
     """A limit with another end, in words."""
     sign = "≤" if end.sign > 0 else "≥"
-    unit = typeset_unit(limit.unit)
-    return f"{limit.name} {sign} {to:.4g} {unit}".rstrip() + f" instead of {end.value:.4g} {unit}".rstrip()
+    return f"{limit.name} {sign} {amount(to, limit.unit)} instead of {amount(end.value, limit.unit)}"

@@ -44,13 +44,13 @@ SMOOTH_PEAK = Statistic(
     (Term(Reduction.SUM, _powers), Term(Reduction.SUM, lambda y, first: _powers(y, first) * jnp.abs(y))),
     lambda sums, count, dt: jnp.where(sums[0] > 0.0, sums[1] / jnp.where(sums[0] > 0.0, sums[0], 1.0), 0.0),
 )
+SMOOTH_SETTLING = Statistic(
+    "smooth_settling_time", of_record=lambda record, dt: smooth_settling_time(record, dt), unit=lambda _: "s"
+)
 EXACT = {  # the true statistic of each smooth one
     SMOOTH_PEAK: STATISTICS["peak"],
-    Statistic(
-        "smooth_settling_time", of_record=lambda record, dt: smooth_settling_time(record, dt), unit=lambda _: "s"
-    ): Statistic("settling_time", of_record=lambda record, dt: settling_time(record, dt), unit=lambda _: "s"),
+    SMOOTH_SETTLING: Statistic("settling_time", of_record=lambda r, dt: settling_time(r, dt), unit=lambda _: "s"),
 }
-SMOOTH_SETTLING = next(smooth for smooth in EXACT if smooth is not SMOOTH_PEAK)
 
 
 def smooth_peak(channel: str, **options: object) -> Metric:
@@ -206,24 +206,24 @@ def _refuse_unusable(available: Mapping[str, Metric], names_by_argument: Mapping
         for name in names:
             _checks.one_of(argument, name, available)
             if not available[name].statistic.differentiable:
-                remedy = (
-                    "Tune on the dynamic load coefficient; limit `Metric('relative_tyre_load', 'minimum')` to "
-                    "(-1, None)."
-                )
+                limit = "limit `Metric('relative_tyre_load', 'minimum')` to (-1, None)."
+                remedy = f"Tune on the dynamic load coefficient; {limit}"
                 _checks.refuse(argument, "have a slope", f"{name!r}, a count", remedy)
 
 
 def goal_objective(
-    one: str | Metric | Function, vehicle: AbstractVehicle, *, white: bool, argument: str = "metric"
+    one: str | Metric | Function,
+    vehicle: AbstractVehicle,
+    *,
+    white: bool,
+    argument: str = "metric",
+    known: Sequence[str] = (),
 ) -> str | Metric | Function:
     """An objective with "comfort", "travel" and "grip" spelled out: the metric, or the mean of several."""
-    if not isinstance(one, str):
+    if not isinstance(one, str) or one in known:
         return one
     names = metrics_of(argument, one, vehicle, white=white)
-    if len(names) == 1:
-        return names[0]
-
-    return _mean_of(one, tuple(names))
+    return names[0] if len(names) == 1 else _mean_of(one, tuple(names))
 
 
 @functools.cache  # the same function for the same names, so that programs are compiled once

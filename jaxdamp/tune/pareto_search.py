@@ -21,7 +21,7 @@ from jaxdamp.tune.front import FrontParameter, ParetoFront, non_dominated, share
 from jaxdamp.tune.limits import Limit, limit_ends, margins
 from jaxdamp.tune.measuring import LANES, ride_on
 from jaxdamp.tune.objective import Function, check_objective, exact_counterpart
-from jaxdamp.tune.ranges import SearchRange, start_points
+from jaxdamp.tune.ranges import start_points
 from jaxdamp.tune.rescoring import other_roads
 from jaxdamp.tune.result import V
 from jaxdamp.tune.scenario_ride import ScenarioRide, smooth_in_scenarios
@@ -94,7 +94,9 @@ def pareto(
     task = DesignTask(objectives, vehicle, road, argument="objectives", settings=settings)
     names, space, evaluator = task.objective.names, task.space, Evaluator(task, LANES)
     given = _reference(reference, names)
-    _refuse_choices(space)
+    if space.is_choice.any():
+        remedy = "Choose by `minimise`, from a point of the front."
+        _checks.refuse("over", "have bounds along a front", "with a `Choice`", remedy)
     starts = start_points(space, settings["starts"], settings["seed"]) / space.unit
     evaluations, limits = evaluator.begin(starts)
     usable = [i for i, one in enumerate(evaluations) if i == 0 or all(np.all(np.isfinite(a)) for a in one)]
@@ -125,7 +127,9 @@ def pareto(
         values=_of_metrics(task, numbers),
         before=_of_metrics(task, before),
         units=task.units,
-        parameters=_parameters(space),
+        parameters=tuple(
+            FrontParameter(c.name, c.unit, c.before, c.lower, c.upper) for c in space.changes(space.start)
+        ),
         designs=designs,
         limits=task.shown_limits(before),
         reference=worst | given,
@@ -156,11 +160,6 @@ def _as_printed(
     return *best, task.measured.reported(task.measured.each(task.vehicle))
 
 
-def _parameters(space: SearchRange) -> tuple[FrontParameter, ...]:
-    """The free numbers with their bounds."""
-    return tuple(FrontParameter(c.name, c.unit, c.before, c.lower, c.upper) for c in space.changes(space.start))
-
-
 def _check(objectives: object, vehicle: object, road: object, points: int, counts: Mapping[str, object]) -> None:
     call = "pareto([metric, metric], vehicle, road)"
     if isinstance(objectives, str) or not isinstance(objectives, Sequence) or len(objectives) not in (2, 3):
@@ -173,12 +172,6 @@ def _check(objectives: object, vehicle: object, road: object, points: int, count
     least = 3 * (len(objectives) - 1)  # the ends and one point between them
     if points < least:
         _checks.refuse("points", f"be {least} or more for {len(objectives)} objectives", points)
-
-
-def _refuse_choices(space: SearchRange) -> None:
-    if space.is_choice.any():
-        remedy = "Choose by `minimise`, from a point of the front."
-        _checks.refuse("over", "have bounds along a front", "with a `Choice`", remedy)
 
 
 def _reference(reference: Mapping[str, float] | None, names: Sequence[str]) -> dict[str, float]:

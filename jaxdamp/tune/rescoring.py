@@ -1,7 +1,6 @@
 """`rescore`: the result of a tuning on other roads."""
 
 import dataclasses
-import itertools
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias, Unpack, final
@@ -11,7 +10,6 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
-from jaxdamp._pieces import piece
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._settings import with_defaults
 from jaxdamp._tables import Column, Compared, Contents, Table, comparison_table, plain
@@ -19,8 +17,7 @@ from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride, simulate
-from jaxdamp.tune.fresh_limits import decided, half_interval
-from jaxdamp.tune.limits import LimitRange, in_scenarios
+from jaxdamp.tune.limits import half_interval, in_scenarios
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.scenario_ride import exact
 from jaxdamp.tune.scenarios import Road, Scenarios
@@ -75,7 +72,6 @@ def spectra(
     return by_channel
 
 
-FEWEST = 4  # fresh roads before their interval is looked at; then twice as many, and so on
 FIRST_SEED = 4711  # of fresh roads, which are thereby others than those of usual small seeds
 
 
@@ -252,42 +248,6 @@ def rescored(
     runs, names = [drive(road) for road in roads], dict.fromkeys([*units, *limited])
     before, after = ({name: np.array([float(pair[side][name]) for pair in runs]) for name in names} for side in (0, 1))
     return Rescore(before, after, units, metric)
-
-
-def on_fresh_roads(
-    drive: Driver,
-    inputs: tuple[object, ...],
-    road: Road | Scenarios,
-    numbers: Sequence[int],
-    allowed: Mapping[str, LimitRange],
-    units: dict[str, str],
-    metric: str,
-) -> Rescore | None:
-    """The vehicle before and after on other realisations of a road, on so many that gain and limits are decided.
-
-    Arguments:
-        drive: the metrics on a road.
-        inputs: what they depend on beside the road.
-        road: of the tuning.
-        numbers: of the realisations.
-        allowed: the range of each limited metric, in every scenario.
-        units: of the metrics.
-        metric: that was minimised.
-
-    Returns:
-        None where there is no other realisation.
-    """
-    others, driven = other_roads(road, numbers), None
-    for first, last in itertools.pairwise([0, *(FEWEST * 2**i for i in range(len(numbers)))]):
-        part = others[first:last]
-        if not part:
-            break
-        what = ("fresh roads", *inputs, part, metric, units, list(allowed))
-        new = piece(what, lambda part=part: rescored(drive, part, units, metric, allowed))
-        driven = new if driven is None else driven.and_on(new)
-        if decided(driven, allowed):
-            break
-    return driven
 
 
 def other_roads(road: Road | Scenarios, numbers: Sequence[int]) -> list[Road | Scenarios]:

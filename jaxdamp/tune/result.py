@@ -15,7 +15,6 @@ from jaxdamp._status import Status
 from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, typeset_unit, with_unit
 from jaxdamp._types import Figure
 from jaxdamp._warned import warn
-from jaxdamp.tune.changes import change_in_percent, mean_change, relative_change
 from jaxdamp.tune.combinations import Combinations
 from jaxdamp.tune.limits import LimitRange, written
 from jaxdamp.tune.objective import Objective, Targets
@@ -23,7 +22,7 @@ from jaxdamp.tune.ranges import Change
 from jaxdamp.tune.rescoring import Rescore, Spectrum, spectra
 from jaxdamp.tune.scenarios import Road
 from jaxdamp.tune.settings import Run
-from jaxdamp.tune.verdict import Verdict, at_limit, verdict_of
+from jaxdamp.tune.verdict import Verdict, at_limit, change_in_percent, mean_change, relative_change, verdict_of
 from jaxdamp.vehicles import AbstractVehicle
 
 

@@ -1,5 +1,6 @@
 """Scenarios: the roads of a tuning and the conditions of the vehicle on them, such as payload, wear and tolerance."""
 
+import copy
 import dataclasses
 import itertools
 from collections.abc import Mapping, Sequence
@@ -145,9 +146,8 @@ class Scenarios:
         return self._with("risk", risk_of(risk))
 
     def _with(self, name: str, value: object) -> "Scenarios":
-        other = object.__new__(Scenarios)
-        for field in dataclasses.fields(self):
-            object.__setattr__(other, field.name, value if field.name == name else getattr(self, field.name))
+        other = copy.copy(self)
+        object.__setattr__(other, name, value)
         return other
 
     def ride(

@@ -121,12 +121,11 @@ def sensitivity(
     point = np.array([*np.asarray(free.values, float), *given.values()])
     measured = _measured(hatted, road, list(given), objective, free, run)
     names = [name for name in objective.units(vehicle) if name in objective.names]
-    compiled = compiled_quickly if is_white(first) else compiled_for_loops
-    values, slopes = _derivatives(measured, names, point, compiled)
     is_curve = np.array([is_hat(p.path, hatted) for p in free.owners] + [False] * len(given), bool)
     chosen = np.flatnonzero(~is_curve)
     units = [*(p.unit for p in of_vehicle.owners), *("m/s" if name == "speed" else "" for name in given)]
-    second = _second(measured, names, point, chosen, compiled) if second_order else None
+    compiled = compiled_quickly if is_white(first) else compiled_for_loops
+    values, slopes, second = _derivatives(measured, names, point, chosen if second_order else None, compiled)
     return Sensitivity(
         values=dict(zip(names, values.tolist(), strict=True)),
         units={name: objective.units(vehicle)[name] for name in names},
@@ -144,7 +143,7 @@ def _objective(
 ) -> Objective:
     """The metrics that are wanted, and no others; of a function all that it may use."""
     further = [one.name for one in more if isinstance(one, Metric)]
-    wanted = [one if one in further else goal_objective(one, vehicle, white=white) for one in wanted]
+    wanted = [goal_objective(one, vehicle, white=white, known=further) for one in wanted]
     objective = objective_of(wanted, vehicle, more, [], white=white)
     if objective.functions:
         return objective
@@ -203,7 +202,8 @@ def _curves(vehicle: AbstractVehicle, pattern: str) -> list[str]:
 def _reach(vehicle: AbstractVehicle, road: Road | Scenarios, run: Run) -> float:
     """Three times the largest RMS of a damper velocity [m/s]."""
     layout = vehicle.layout
-    velocities = {m.channel for m in layout.metrics if layout.by_name[m.channel].kind is ChannelKind.DAMPER_VELOCITY}
+    kinds = ChannelKind.DAMPER_VELOCITY, ChannelKind.TWIST_VELOCITY
+    velocities = {m.channel for m in layout.metrics if layout.by_name[m.channel].kind in kinds}
     metrics = [Metric(channel, "rms") for channel in sorted(velocities)]
     if isinstance(road, Scenarios):
         peaks = road.with_risk("worst").ride(vehicle, metrics=metrics, **run)()
@@ -248,29 +248,24 @@ def _measured(
 
 
 def _derivatives(
-    measured: MetricsOf, names: Sequence[str], point: np.ndarray, compiled: Callable[..., Callable]
-) -> tuple[np.ndarray, np.ndarray]:
-    """The metrics, shape (names,), and their derivatives, shape (names, numbers)."""
+    measured: MetricsOf,
+    names: Sequence[str],
+    point: np.ndarray,
+    chosen: np.ndarray | None,
+    compiled: Callable[..., Callable],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """The metrics, shape (names,), their derivatives, (names, numbers), and second ones, (names, chosen, chosen)."""
+    start = jnp.asarray(point)
 
-    def stacked(x: jax.Array) -> jax.Array:
+    def stacked(x: Array) -> Array:
         results = measured(x)
         return jnp.stack([results[name] for name in names])
 
-    values, slopes = compiled(with_jacobian(stacked))(jnp.asarray(point))
-    return np.asarray(values, float), np.asarray(slopes, float)
-
-
-def _second(
-    measured: MetricsOf, names: Sequence[str], point: np.ndarray, chosen: np.ndarray, compiled: Callable[..., Callable]
-) -> np.ndarray:
-    """Second derivatives by some of the numbers, shape (names, chosen, chosen)."""
-    start = jnp.asarray(point)
-
-    def stacked(part: jax.Array) -> jax.Array:
-        results = measured(start.at[chosen].set(part))
-        return jnp.stack([results[name] for name in names])
-
-    return np.asarray(compiled(jax.jacfwd(jax.jacfwd(stacked)))(start[chosen]), float)
+    values, slopes = (np.asarray(a, float) for a in compiled(with_jacobian(stacked))(start))
+    if chosen is None:
+        return values, slopes, None
+    twice = jax.jacfwd(jax.jacfwd(lambda part: stacked(start.at[chosen].set(part))))
+    return values, slopes, np.asarray(compiled(twice)(start[chosen]), float)
 
 
 def _curve_parts(

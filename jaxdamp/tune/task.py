@@ -30,20 +30,9 @@ from jaxdamp.tune.objective import Function, Targets, goal_limits, goal_objectiv
 from jaxdamp.tune.ranges import search_range
 from jaxdamp.tune.result import V
 from jaxdamp.tune.scenarios import Road, Scenarios
-from jaxdamp.tune.settings import LEAST, RUN, Run, Settings
+from jaxdamp.tune.settings import LEAST, RUN, Settings
 from jaxdamp.tune.shape import ShapeNumbers
 from jaxdamp.vehicles import AbstractVehicle
-
-
-def rides_on(road: Road | Scenarios, metrics: Sequence[Metric], run: Run) -> list[Callable[[AbstractVehicle], Ride]]:
-    """For each road a function that makes the checked ride of a vehicle on it, in no special condition."""
-    roads = [s.road for s in road.scenarios] if isinstance(road, Scenarios) else [road]
-    distinct = list({id(one): one for one in roads}.values())
-
-    def on(one: Road) -> Callable[[AbstractVehicle], Ride]:
-        return lambda vehicle: Ride(vehicle, one, metrics=metrics, **run)
-
-    return [on(one) for one in distinct]
 
 
 def step_notes(start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable[[AbstractVehicle], Ride]) -> list[str]:
@@ -70,11 +59,7 @@ def range_notes(
 ) -> tuple[list[str], list[str]]:
     """A sentence for each damper used outside its fitted range, before and after the tuning; and by how much, briefly.
 
-    Arguments:
-        start: the vehicle before.
-        tuned: the vehicle after.
-        rides: the ride of a vehicle on each road; on a white road, velocities up to three standard deviations are
-            compared.
+    On a white road, velocities up to three standard deviations are compared.
     """
     if not rides or not has_fitted_range((start, tuned)):
         return [], []
@@ -130,11 +115,9 @@ class DesignTask(Generic[V]):
         metrics, white = settings["metrics"], is_white(road)
         further = [m.name for m in metrics if isinstance(m, Metric)]
         metric_names = [*(m.name for m in vehicle.ride_metrics), *further]
-        objectives = [
-            one if one in further else goal_objective(one, vehicle, white=white, argument=argument)
-            for one in objectives
-        ]
-        limits = goal_limits(settings["limits"], vehicle, white=white, known=further)
+        spelled = {"white": white, "known": further}
+        objectives = [goal_objective(one, vehicle, argument=argument, **spelled) for one in objectives]
+        limits = goal_limits(settings["limits"], vehicle, **spelled)
         self.allowed = limit_ranges(limits, metric_names)
         limited = [metric for metric in limits or {} if isinstance(metric, Metric)]
         of_targets = _metrics_of_targets(objectives, metric_names, limited)
@@ -186,7 +169,10 @@ class DesignTask(Generic[V]):
 
     def notes_on_runs(self, design: AbstractVehicle) -> tuple[list[str], list[str]]:
         """Notes on the step and on the fitted ranges for a design, on every road; and the dampers far outside."""
-        rides, white = rides_on(self.road, self.objective.metrics, self.run), is_white(self.road)
+        metrics, white = self.objective.metrics, is_white(self.road)
+        roads = [s.road for s in self.road.scenarios] if isinstance(self.road, Scenarios) else [self.road]
+        distinct = {id(one): one for one in roads}.values()  # in no special condition
+        rides = [lambda vehicle, one=one: Ride(vehicle, one, metrics=metrics, **self.run) for one in distinct]
         road = rides[0](design).road if white else None
         notes = stationary_notes(design, road) if isinstance(road, WhiteRoad) else []
         coarse = [[] if white else step_notes(self.vehicle, design, ride_of) for ride_of in rides]
@@ -198,11 +184,7 @@ class DesignTask(Generic[V]):
 
 @final
 class Evaluator(Generic[V]):
-    """The rows that a search follows, at points given by their coordinates: objectives, then ends of limits.
-
-    Attributes:
-        program: that computes the numbers.
-    """
+    """The rows that a search follows, at points given by their coordinates: objectives, then ends of limits."""
 
     def __init__(self, task: DesignTask[V], lanes: int) -> None:
         self.task, self.program = task, BatchProgram(task.measured, task.space.free, lanes)

@@ -242,13 +242,17 @@ def _loop(target: AbstractDamper, start: MonoTube | TwinTube, frequency: float, 
 def _forces(free: FreeParameters, wanted: Wanted, substeps: int) -> ForceOf:
     """Every force of the damper as a function of the values of its free parameters, with derivatives."""
 
+    def marched(law: MonoTube | TwinTube, loop: Loop) -> Array:
+        dt, stroke, velocity = (jnp.asarray(values) for values in (loop.dt, loop.stroke, loop.velocity))
+        return march(law, dt, stroke, velocity, substeps)[loop.first :]
+
     @eqx.filter_jit
     def forces(free: FreeParameters, values: Array) -> tuple[Array, Array]:
         def one(values: Array) -> Array:
             law = free.build(values)
             still = law.incompressible()
             curve = jax.vmap(lambda v: still.force(0.0, v, still.initial_state()))(jnp.asarray(wanted.velocity))
-            return jnp.concatenate([curve, *(_marched(law, loop, substeps) for loop in wanted.loops)])
+            return jnp.concatenate([curve, *(marched(law, loop) for loop in wanted.loops)])
 
         return with_jacobian(one)(values)
 
@@ -257,12 +261,6 @@ def _forces(free: FreeParameters, wanted: Wanted, substeps: int) -> ForceOf:
         return np.asarray(computed[0], np.float64), np.asarray(computed[1], np.float64)
 
     return evaluate
-
-
-def _marched(law: MonoTube | TwinTube, loop: Loop, substeps: int) -> Array:
-    """The force of a law at the compared samples of a motion."""
-    dt, stroke, velocity = (jnp.asarray(values) for values in (loop.dt, loop.stroke, loop.velocity))
-    return march(law, dt, stroke, velocity, substeps)[loop.first :]
 
 
 def _starts(space: SearchRange, count: int) -> list[np.ndarray]:

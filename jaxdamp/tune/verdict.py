@@ -8,12 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from jaxdamp._status import Status
-from jaxdamp._tables import typeset_unit
 from jaxdamp.metrics import Metric
 from jaxdamp.solve import Evaluation
-from jaxdamp.tune.changes import change_in_percent, mean_change, signed_metrics
-from jaxdamp.tune.fresh_limits import WITHIN, excess, in_each, lost_limits
-from jaxdamp.tune.limits import Limit, LimitRange
+from jaxdamp.tune.limits import WITHIN, Limit, LimitRange, amount, excess, in_each, lost_limits
 from jaxdamp.tune.objective import Objective, exact_counterpart
 from jaxdamp.tune.ranges import FACTOR, Change, SearchRange
 from jaxdamp.vehicles import AbstractVehicle, ChannelKind
@@ -29,6 +26,37 @@ PRICED = (  # kinds of channels whose rise is a price: of body, travel and tyres
     ChannelKind.STROKE, ChannelKind.TYRE_LOAD, ChannelKind.RELATIVE_TYRE_LOAD,
 )  # fmt: skip
 NOTICED = 0.05  # percent: smaller changes are none
+
+
+def relative_change(before: float, after: float) -> float | None:
+    """The change relative to the size before [%], positive where it rises, also of what is negative; none from zero."""
+    return 100.0 * (after - before) / abs(before) if before else None
+
+
+def signed_metrics(result: "TuneResult[AbstractVehicle]") -> set[str]:
+    """Names of the metrics that may be negative, of which a change in percent says nothing."""
+    known = (*result.start.layout.metrics, *(result.objective.metrics if result.objective else ()))
+    return {metric.name for metric in known if metric.statistic.signed}
+
+
+def change_in_percent(result: "TuneResult[AbstractVehicle]", name: str, before: float, after: float) -> float | None:
+    """The change of a metric [%]; none from zero, and none of one that may be negative.
+
+    Arguments:
+        result: of the tuning.
+        name: of the metric.
+        before: its value at the start, in its unit.
+        after: its value at the end, in its unit.
+    """
+    return None if name in signed_metrics(result) else relative_change(before, after)
+
+
+def mean_change(result: "TuneResult[AbstractVehicle]", name: str) -> float | None:
+    """The change of a metric [%], the mean on fresh roads if there are any; none as of `change_in_percent`."""
+    if result.fresh is None or name not in result.fresh.before or name in signed_metrics(result):
+        return change_in_percent(result, name, result.before[name], result.after[name])
+    change = 100.0 * float(np.mean(result.fresh.change(name)))
+    return change if np.isfinite(change) else None
 
 
 class Outcome(enum.Enum):
@@ -108,7 +136,7 @@ def _change(result: "TuneResult[AbstractVehicle]") -> tuple[float, str]:
 
 
 def _from_to(result: "TuneResult[AbstractVehicle]", name: str, before: float, after: float) -> str:
-    return f"{before:.4g} -> {after:.4g} {typeset_unit(result.units[name])}".rstrip()
+    return f"{before:.4g} -> {amount(after, result.units[name])}"
 
 
 def _price(result: "TuneResult[AbstractVehicle]") -> tuple[float, str]:
@@ -146,7 +174,7 @@ def _limits_in_words(result: "TuneResult[AbstractVehicle]") -> str:
     texts = []
     for name in result.limits:
         after, change = result.after[name], mean_change(result, name)
-        share = f"{after:.4g} {typeset_unit(result.units[name])}".rstrip() if change is None else f"{change:+.1f} %"
+        share = amount(after, result.units[name]) if change is None else f"{change:+.1f} %"
         text = f"{name} {share}{', ' * (name in result.active_limits)}{at_limit(result, name)}"
         if (fresh := result.fresh) is not None and name in result.allowed:
             over = [excess(fresh, one, span) for one, span in _allowed(result, name).items()]

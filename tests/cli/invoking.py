@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from jaxdamp.cli import app
-from jaxdamp.report import drawing
+from jaxdamp.report import page
 
 
 def jaxdamp(*words: str | Path, code: int = 0) -> Result:
@@ -29,13 +29,13 @@ def refused(folder: Path, *words: str | Path) -> str:
 
 @functools.cache
 def _blank() -> bytes:
-    return drawing.png(matplotlib.figure.Figure(figsize=(0.1, 0.1)))
+    return page.png(matplotlib.figure.Figure(figsize=(0.1, 0.1)))
 
 
 def draw_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """From here on files of pictures are empty."""
     blank = _blank()
-    monkeypatch.setattr(drawing, "png", lambda figure: blank)
+    monkeypatch.setattr(page, "png", lambda figure: blank)
     monkeypatch.setattr(matplotlib.figure.Figure, "savefig", not_drawn)
 
 

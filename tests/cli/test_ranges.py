@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from jaxdamp import roads, simulate, vehicles
-from jaxdamp.cli.jobs import without_range_warnings
+from jaxdamp.cli.jobs import with_step_warnings
 from jaxdamp.dampers import Bilinear, FittedRange, Linear, with_fitted_range
 from jaxdamp.export import from_json, to_json
 from jaxdamp.report import fitted_range_table, notes_of, range_use_table
@@ -48,10 +48,11 @@ def test_a_ride_beyond_the_range_is_said_in_table_report_and_words(tmp_path: Pat
 def test_tables_and_remarks() -> None:
     car = vehicles.presets.quarter_car_000(with_fitted_range(Linear(1500.0), SLOW))
     bump = roads.cosine_bump(0.05, start=0.1, duration=0.2)
-    with without_range_warnings(), warnings.catch_warnings(record=True) as caught:
-        run = simulate(car, bump, duration=1.0, dt=0.002)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        run, said = with_step_warnings(lambda: simulate(car, bump, duration=1.0, dt=0.002))
     plain = simulate(vehicles.presets.quarter_car_000(), bump, duration=1.0, dt=0.002)
-    assert not caught
+    assert not caught and not said
     table = range_use_table({"fitted": run, "plain": plain})
     assert table is not None and {row[0] for row in table.rows} == {"fitted"}
     assert range_use_table({"plain": plain}) is None

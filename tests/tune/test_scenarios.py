@@ -11,8 +11,7 @@ import pytest
 from jaxdamp import Ride, dampers, parameters, roads, sweep, tune, vehicles
 from jaxdamp.metrics import Metric
 from jaxdamp.tune import rescoring
-from jaxdamp.tune.fresh_limits import in_each, lost_limits
-from jaxdamp.tune.limits import limit_ranges
+from jaxdamp.tune.limits import in_each, limit_ranges, lost_limits
 
 
 LAW = dampers.TemperatureScaled(dampers.Bilinear(2500.0, 1500.0), temperature=293.15)

@@ -11,8 +11,7 @@ import pytest
 from jaxdamp import dampers, roads, tune
 from jaxdamp.solve import SequentialQuadratic
 from jaxdamp.tune import Outcome, Rescore, Status, TuneResult, minimising
-from jaxdamp.tune.fresh_limits import decided, half_interval
-from jaxdamp.tune.limits import Limit, limit_ranges
+from jaxdamp.tune.limits import Limit, decided, half_interval, limit_ranges
 from jaxdamp.tune.ranges import Change
 from jaxdamp.vehicles import presets
 
