@@ -1,12 +1,10 @@
-"""Wrong guesses of public names, answered with the right one; old names, which keep working for a release."""
+"""Wrong guesses of public names, answered with the right one."""
 
 import ast
 import inspect
 import sys
-import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from difflib import get_close_matches
-from importlib import import_module
 from types import ModuleType
 from typing import NoReturn
 
@@ -60,25 +58,6 @@ def answer_guesses(module: str, public: Sequence[str]) -> None:
         public: the names that it has.
     """
     vars(sys.modules[module])["__getattr__"] = lambda name: answer(module, name, public)
-
-
-def answer_old_names(module: str, public: Sequence[str], homes: Mapping[str, str]) -> None:
-    """Give names that a package lists no longer, with a warning; answer others as `answer_guesses` does.
-
-    Arguments:
-        module: name of the package.
-        public: the names that it has.
-        homes: for each old name the module of the package that defines it.
-    """
-
-    def find(name: str) -> object:
-        if name not in homes:
-            answer(module, name, public)
-        text = f"`{module}.{name}` is no public name any more: objects of it are returned, not made."
-        warnings.warn(text, DeprecationWarning, stacklevel=2)
-        return getattr(import_module(f"{module}.{homes[name]}"), name)
-
-    vars(sys.modules[module])["__getattr__"] = find
 
 
 class Elsewhere:

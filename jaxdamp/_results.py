@@ -10,7 +10,6 @@ from jaxdamp import _checks
 from jaxdamp._status import Status
 from jaxdamp._tables import Contents, Table, plain, with_unit
 from jaxdamp._types import Figure
-from jaxdamp._warned import warn
 
 
 T = TypeVar("T")
@@ -117,31 +116,19 @@ class AbstractResult(ABC):
         return "\n".join([self.summary, self.table().to_text(), *(f"warning: {text}" for text in self.warnings)])
 
 
-def plotted(
-    kind: object,
-    kinds: Mapping[str, Callable[..., Figure]],
-    result: "AbstractResult",
-    before: str = "",
-    /,
-    **options: object,
-) -> Figure:
+def plotted(kind: str, kinds: Mapping[str, Callable[..., Figure]], result: AbstractResult, **options: object) -> Figure:
     """The picture of a result of the kind that `result.plot(kind)` names.
 
     Arguments:
         kind: a name among the kinds.
-        kinds: the function for each; the first is the default.
+        kinds: the function for each.
         result: what is drawn.
-        before: the option that stood in the place of the kind in earlier releases.
         options: of the function.
 
     Raises:
         ValueError: an unknown kind.
     """
-    if before and not isinstance(kind, str):
-        warn(f"Write `plot({before}=...)`: `kind` comes first now.", DeprecationWarning)
-        kind, options = next(iter(kinds)), {before: kind, **options}
-    name = str(kind)
-    _checks.one_of("kind", name, kinds)
+    _checks.one_of("kind", name := str(kind), kinds)
     return kinds[name](result, **options)
 
 
@@ -149,13 +136,3 @@ def worst_status(statuses: Iterable[Status]) -> Status:
     """The first status that is not good; else the first one."""
     every = tuple(statuses)
     return next((status for status in every if not status.good), every[0] if every else Status.COMPUTED)
-
-
-class CallableText(str):
-    """A text that could be called in earlier releases."""
-
-    def __call__(self) -> str:
-        """Deprecated: the text."""
-        text = "`summary` is a property now: write `result.summary` without brackets."
-        warn(text, DeprecationWarning)
-        return str(self)

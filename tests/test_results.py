@@ -199,12 +199,6 @@ def test_the_worst_of_several_ends_counts() -> None:
     assert worst_status([Status.COMPUTED, Status.CONVERGED]) is Status.COMPUTED
 
 
-def test_the_summary_of_a_preflight_can_still_be_called(samples) -> None:
-    found = samples[bench.Preflight]
-    with pytest.warns(DeprecationWarning, match="property now"):
-        assert found.summary() == found.summary
-
-
 def test_a_metric_that_nothing_changes_is_named(samples) -> None:
     assert samples[tune.Sensitivity].warnings == (
         "rms_sprung_acceleration does not depend on any of these numbers here.",

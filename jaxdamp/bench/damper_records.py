@@ -12,7 +12,7 @@ from typing import final
 
 from jaxdamp import _checks
 from jaxdamp._files import FOLDER_SUFFIXES, natural_key
-from jaxdamp.bench.manifest import NAME
+from jaxdamp.bench.manifest import NAME, find_manifest
 from jaxdamp.bench.raw_tables import library
 from jaxdamp.bench.read import read
 from jaxdamp.bench.runs import BenchRun
@@ -151,9 +151,10 @@ def read_dampers(paths: str | os.PathLike[str], *, each: str, **options: object)
     if not files:
         raise FileNotFoundError(f"{top} holds no *.csv or other file of records.")
     common = (top if top.is_dir() else top.parent) / NAME
-    given, said = options.get("manifest"), _said(options)
-    own = Path(given).expanduser() if isinstance(given, str | os.PathLike) else None
-    manifests = [own or _manifest(some[0].parent, common) for some in files.values()]
+    given, said = options.get("manifest", True), _said(options)
+    own = find_manifest(given, [top]) if isinstance(given, str | os.PathLike) else None
+    own = None if own is None else own.absolute()  # also read where the working directory is another one
+    manifests = [own or (_manifest(some[0].parent, common) if given else None) for some in files.values()]
     keys = list(zip(files.values(), manifests, strict=True))
     stamps = [f"{_stamp(some if at is None else [*some, at])} {said}".strip() for some, at in keys]
     return DamperRecords(functools.partial(_read_damper, options), keys, files, stamps)
@@ -163,7 +164,7 @@ def _read_damper(options: Mapping[str, object], key: tuple[list[Path], Path | No
     """The records of the files of a damper, as their manifest says."""
     files, manifest = key
     reading: Callable[..., BenchSet] = read
-    return reading(files, **{"manifest": False if manifest is None else manifest, **options})
+    return reading(files, **{**options, "manifest": False if manifest is None else manifest})
 
 
 def _of_tree(top: Path, each: str) -> dict[str, list[Path]]:

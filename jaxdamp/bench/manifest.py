@@ -53,7 +53,7 @@ def with_manifest(
     """
     asked: list[str | os.PathLike[str]] = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
     folders = [Path(path) for path in asked if len(asked) == 1 and Path(path).expanduser().is_dir()]
-    file = _manifest(manifest, folders)
+    file = find_manifest(manifest, folders)
     if file is None:
         return asked, given, ()
     stated = _read_manifest(file, keys)
@@ -77,7 +77,7 @@ def _merged(stated: Contents, given: Contents) -> Contents:
     return out
 
 
-def _manifest(manifest: str | os.PathLike[str] | bool | None, folders: Sequence[Path]) -> Path | None:
+def find_manifest(manifest: str | os.PathLike[str] | bool | None, folders: Sequence[Path]) -> Path | None:
     """The manifest given, or the one in the folder that is read."""
     if isinstance(manifest, bool | None):
         inside = [folder.expanduser() / NAME for folder in folders if manifest]

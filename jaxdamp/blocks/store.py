@@ -175,6 +175,14 @@ class BlockStore(AbstractStore):
         more._names = self._names
         return more
 
+    def begun_again(self, number: int, known: Mapping[str, np.ndarray]) -> None:
+        """A block along the only axis that is not done any more, with what is known of its points."""
+        group, start = import_zarr().open_group(self.path, mode="r+"), number * self.blocks.box[0]
+        group[DONE][number] = -1
+        for name, blank in zip(FAILURES, (False, ""), strict=True):
+            group[name][self.blocks.region(number)] = blank
+        _enter(self.path, known, start)
+
     def read(self, *names: str, start: int = 0, stop: int | None = None) -> dict[str, np.ndarray]:
         """Variables of all points along the first axis, or of some."""
         group, stop = import_zarr().open_group(self.path, mode="r"), self.blocks.shape[0] if stop is None else stop

@@ -59,7 +59,7 @@ CALLS = {
     r"`process\(low_pass=([^)]*)\)`": r"--filter \1",
     r"`process\(between=[^`]*`": "--between start:end",
     r": `record_laws` has the law of each": "; the table of parameters has that of each",
-    r", or fit a law with settings \(`dampers\.Scheduled`\)": "",
+    r", or fit a law with settings \(`dampers\.Scheduled`, `fit_scheduled`\)": "",
     r"`process\(moving=True\)` cuts it off": "it is cut off without --keep-rest",
     r"`process\(skip_cycles=[^)]*\)`": "--cycles skip:1",
     r"subtract it, `process\(without=[^`]*`": "fit it beside the law, --rig gas",

@@ -13,7 +13,6 @@ from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
 from jaxdamp._tables import Contents, Table, plain, with_unit
 from jaxdamp._types import Figure, VectorLike
-from jaxdamp._warned import warn
 from jaxdamp.bench import BenchRun, as_runs, initial_temperature
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.estimates import parameter_table
@@ -94,12 +93,6 @@ class AbstractFitted(AbstractResult):
             return []
         forces = predict_by_record(self.models_of(records)[0], records, self.initial_state)[1]
         return forces[0] if isinstance(runs, BenchRun) else forces
-
-    def predict(self, runs: BenchRun | Iterable[BenchRun]) -> list[np.ndarray]:
-        """Deprecated: `respond` gives the same, without a list for one record."""
-        text = "`predict` is deprecated: `respond(run)` gives the force of one record, `respond(runs)` a list."
-        warn(text, DeprecationWarning)
-        return self.respond(as_runs(runs))
 
     def score(self, runs: BenchRun | Iterable[BenchRun]) -> tuple[float, float, tuple[Score, ...]]:
         """Fit percent, RMSE [N] and the scores by record, on records old or new, as `respond` predicts them."""
@@ -210,7 +203,7 @@ class FitResult(AbstractFitted, Fit):
         """Law, errors, scores and parameters as plain data."""
         return AbstractFitted.content(self) | Fit.content(self) | {"error_shares": plain(self.error_shares._asdict())}
 
-    def plot(self, kind: str | Iterable[BenchRun] = "loops", **options: object) -> Figure:
+    def plot(self, kind: str = "loops", **options: object) -> Figure:
         """Loops of force over velocity and over stroke, measured and fitted, with residuals; or the damper's sheet.
 
         Arguments:
@@ -219,4 +212,4 @@ class FitResult(AbstractFitted, Fit):
         """
         from jaxdamp.plots import damper_sheet, fit_loops
 
-        return plotted(kind, {"loops": fit_loops, "sheet": damper_sheet}, self, "runs", **options)
+        return plotted(kind, {"loops": fit_loops, "sheet": damper_sheet}, self, **options)

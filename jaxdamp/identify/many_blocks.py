@@ -20,13 +20,7 @@ from jaxdamp._warned import warn
 from jaxdamp.bench import BenchRun, DamperRecords
 from jaxdamp.blocks import AbstractWork, Blocks, BlockStore, Cluster, Variable, fill, stored_blocks
 from jaxdamp.identify.contradicting import refuse_several_laws
-from jaxdamp.identify.many_records import (
-    AllRecords,
-    Options,
-    begun_on,
-    fitted_records,
-    left_out_in_words,
-)
+from jaxdamp.identify.many_records import AllRecords, Options, begun_on, code_of, fitted_records, left_out_in_words
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.preparing import Beginning
 from jaxdamp.identify.starting import Start
@@ -249,7 +243,11 @@ def _rows(path: Path, identity: Mapping[str, str], records: AllRecords, count: i
         rows = _places(store)
         new = {name: stamp for name, stamp in stamps.items() if (name, stamp) not in rows}
         if new:
-            store = store.append(_known(new))
+            useless = _without_fits(store) if len(new) <= BLOCK else None
+            if useless is None:
+                store = store.append(_known(new))
+            else:
+                store.begun_again(useless, _known(new))
             rows = _places(store)
     return store, np.array([rows[pair] for pair in stamps.items()])
 
@@ -259,6 +257,18 @@ def _places(store: BlockStore) -> dict[tuple[str, str], int]:
     columns = zip(*store.read("name", "stamp", "reason").values(), strict=True)
     again = (ABSENT, AGAIN)
     return {(str(n), str(s)): row for row, (n, s, why) in enumerate(columns) if n and not str(why).endswith(again)}
+
+
+def _without_fits(store: BlockStore) -> int | None:
+    """A block that is done and holds nothing but dampers that are tried again; none if there is none."""
+    names, reasons = store.read("name", "reason").values()
+    left = set(store.left().tolist())
+    for number in range(store.blocks.count):
+        region = store.blocks.region(number)
+        why = [str(reason) for name, reason in zip(names[region], reasons[region], strict=True) if name]
+        if number not in left and all(reason.endswith((ABSENT, AGAIN)) for reason in why):
+            return number
+    return None
 
 
 def _known(stamps: Mapping[str, str]) -> dict[str, np.ndarray]:
@@ -304,7 +314,7 @@ def _identity(beginning: Beginning, runs: Sequence[BenchRun], options: Options) 
         for name, value in options.items()
         if name not in ("rig", "over", "freeze")
     }
-    return {"start": start, "parameters": ", ".join(beginning.free.names), **said}
+    return {"start": start, "code": code_of(beginning.law), "parameters": ", ".join(beginning.free.names), **said}
 
 
 def _sentence(error: Exception) -> str:

@@ -1,13 +1,21 @@
 """The records of many dampers: what a call gives as such, what a fit takes of them, and where all fits start."""
 
+import hashlib
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
+import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxdamp import _checks
 from jaxdamp._settings import part
+from jaxdamp._types import Scalar, State
 from jaxdamp.bench import BenchRun, DamperRecords, as_runs, usable
+from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.machine import Machine
 from jaxdamp.identify.preparing import Beginning, begun
 from jaxdamp.identify.settings import FREE, PROBLEM, FitSettings, ProblemSettings
@@ -60,3 +68,16 @@ def begun_on(law: Start, runs: Sequence[BenchRun], options: Options, shared: Ite
     """The start that some records give."""
     how: ProblemSettings = {**PROBLEM, **part(options, FREE)}
     return begun(law, runs, [1.0] * len(runs), options["rig"], how, mentioned=shared)
+
+
+def code_of(law: AbstractDamper) -> str:
+    """A text that changes with the code of a law, also of one of your own, but not with its numbers."""
+    arrays, others = eqx.partition(law, eqx.is_array)
+
+    def force_and_step(arrays: PyTree, x: Scalar, v: Scalar, dt: Scalar, state: State) -> tuple[Scalar, State]:
+        whole = eqx.combine(arrays, others)
+        return whole.force(x, v, state), whole.advance(x, v, x, v, state, dt)
+
+    one = np.ones((), jnp.result_type(float))
+    program = jax.make_jaxpr(force_and_step)(arrays, one, one, one, law.initial_state())
+    return hashlib.sha256(re.sub(r"0x[0-9a-f]+", "", str(program)).encode()).hexdigest()[:12]

@@ -158,6 +158,8 @@ class ManyFits(AbstractResult):
         if self.settings is None:
             _checks.refuse("settings", "be given to `fit_many` for a law between them", None)
         settings = np.array(self.settings)[self._fitted]
+        if not settings.size:
+            _checks.refuse("setting", "lie between dampers that were fitted, and none was", setting, self.summary)
         if not settings.min() <= setting <= settings.max():
             must = f"be from {settings.min():g} to {settings.max():g}, where there are dampers"
             _checks.refuse("setting", must, setting)

@@ -10,7 +10,6 @@ from jaxtyping import Array, Bool, Float
 from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._results import Derived, drawn_by
 from jaxdamp._tables import Column, Contents, Table, with_unit
-from jaxdamp._warned import warn
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.estimates import parameter_table
 from jaxdamp.identify.model import VehicleTest
@@ -132,12 +131,6 @@ class VehicleFit(Fit):
         """Time at the beginning of each record that was not compared [s]."""
         part = _driven(self.problem)[0]
         return int(np.argmax(np.asarray(part.weight)[0, 0] > 0)) * part.dt * part.finer
-
-    def predict(self) -> dict[str, dict[str, Float[np.ndarray, " time"]]]:
-        """Deprecated: `respond(record)` gives the channels of one record."""
-        text = "`predict()` of a fitted vehicle is deprecated: write `respond(record)` for one record."
-        warn(text, DeprecationWarning)
-        return {record.name: self.respond(record) for record in self.records}
 
     def table(
         self,

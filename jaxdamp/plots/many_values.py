@@ -82,12 +82,12 @@ def targets(result: TargetFit) -> Figure:
 def rescore(result: Rescore) -> Figure:
     """The change of each ride metric by the tuning on each of the other roads, and its mean.
 
-    Metrics that are zero or negative on a road are left out, since they have no change in percent.
+    Metrics without a change in percent, as they are zero or negative on a road or may be, are left out.
 
     Arguments:
         result: of `tune.rescore`.
     """
-    names = [name for name in result.units if np.all(result.before[name] > 0)]
+    names = result.in_percent
     rows = np.arange(len(names), dtype=float)
     figure = _style.new_figure(8.5, 1.6 + 0.35 * len(names))
     axes = figure.subplots()

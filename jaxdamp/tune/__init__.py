@@ -13,7 +13,7 @@
 - `compare_dampers`: differences between dampers with error bars; `valving`: a mono-tube damper for a wanted force.
 """
 
-from jaxdamp._guesses import answer_old_names
+from jaxdamp._guesses import answer_guesses
 from jaxdamp._status import Status as Status
 from jaxdamp.tune.decisions import DamperComparison as DamperComparison, compare_dampers
 from jaxdamp.tune.front import ParetoFront as ParetoFront, hypervolume as hypervolume
@@ -63,22 +63,4 @@ __all__ = [
     "valving",
 ]
 
-answer_old_names(
-    __name__,
-    __all__,
-    {
-        "Attempt": "result",
-        "Change": "ranges",
-        "CurveSensitivity": "sensitivity_result",
-        "Difference": "decisions",
-        "FittedLaw": "decisions",
-        "OutOfReach": "valving_result",
-        "Scenario": "scenarios",
-        "ScenarioRide": "scenario_ride",
-        "ScenarioValues": "result",
-        "Shape": "shape",
-        "Spectrum": "rescoring",
-        "ToleranceEffect": "result",
-        "ValveParameter": "valving_result",
-    },
-)
+answer_guesses(__name__, __all__)

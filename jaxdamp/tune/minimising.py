@@ -277,7 +277,7 @@ def _on_fresh_roads(
         if not part:
             break
         what = ("fresh roads", cars, task.run, part, name, task.units, list(allowed))
-        new = piece(what, lambda part=part: rescored(drive, part, task.units, name, allowed))
+        new = piece(what, lambda part=part: rescored(drive, part, task.units, name, task.objective.metrics, allowed))
         driven = new if driven is None else driven.and_on(new)
         if decided(driven, allowed):
             break

@@ -17,7 +17,7 @@ from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride, simulate
-from jaxdamp.tune.limits import half_interval, in_scenarios
+from jaxdamp.tune.limits import amount, half_interval, in_scenarios
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.scenario_ride import exact
 from jaxdamp.tune.scenarios import Road, Scenarios
@@ -86,12 +86,14 @@ class Rescore(AbstractResult):
         after: the same of the tuned vehicle.
         units: unit of each metric.
         metric: name of the metric that was minimised.
+        signed: names of the metrics that may be negative, of which a change in percent says nothing.
     """
 
     before: dict[str, Float[np.ndarray, " roads"]]
     after: dict[str, Float[np.ndarray, " roads"]]
     units: dict[str, str]
     metric: str
+    signed: frozenset[str] = frozenset()
 
     @property
     def roads(self) -> int:
@@ -132,24 +134,29 @@ class Rescore(AbstractResult):
     @property
     def summary(self) -> str:
         """Number of roads on which the minimised metric decreases, and by how much, in a sentence."""
+        before, after = self.before[self.metric], self.after[self.metric]
+        head = f"On {np.count_nonzero(after < before)} of {self.roads} roads {self.metric} decreases"
+        if self.metric not in self.in_percent:
+            return f"{head}, from {before.mean():.4g} to {amount(after.mean(), self.units[self.metric])} on average."
         gain = -100 * self.change(self.metric)
         error = f" ± {100 * self.half_width(self.metric):.1f}" if self.roads > 1 else ""
-        return (
-            f"On {np.count_nonzero(gain > 0)} of {self.roads} roads {self.metric} decreases, by "
-            f"{gain.mean():.1f}{error} % on average ({gain.min():.0f} to {gain.max():.0f} %)."
-        )
+        return f"{head}, by {gain.mean():.1f}{error} % on average ({gain.min():.0f} to {gain.max():.0f} %)."
+
+    @property
+    def in_percent(self) -> list[str]:
+        """The metrics that have a change in percent: positive on each road, by what they are and before the tuning."""
+        return [name for name in self.units if name not in self.signed and np.all(self.before[name] > 0)]
 
     def table(self) -> Table:
         """Means over the roads, the mean of the change, and its smallest and largest value on a road.
 
-        Metrics that are zero or negative on a road are left out, since they have no change in percent.
+        Metrics without a change in percent are left out.
         """
         rows = []
-        for name in self.units:
-            if np.all((before := self.before[name]) > 0):
-                change, means = 100 * self.change(name), (float(before.mean()), float(self.after[name].mean()))
-                ends = (float(change.min()), float(change.max()))
-                rows.append(Compared(name, self.units[name], means, float(change.mean()), ends))
+        for name in self.in_percent:
+            change, means = 100 * self.change(name), (float(self.before[name].mean()), float(self.after[name].mean()))
+            ends = (float(change.min()), float(change.max()))
+            rows.append(Compared(name, self.units[name], means, float(change.mean()), ends))
         title = f"Ride metrics on {self.roads} other roads (means, and the change on each road)"
         more = (Column("smallest", "%", "+.1f"), Column("largest", "%", "+.1f"))
         return comparison_table(title, "metric", ("before", "after"), rows, more)
@@ -207,7 +214,7 @@ def rescore(
     units = {m.name: m.unit(result.start.units) for m in metrics} | (objective.units(result.start) if objective else {})
     cars = (result.start, result.vehicle)
     drive = driver(cars, metrics, objective, run)
-    return rescored(drive, roads, units, result.metric)
+    return rescored(drive, roads, units, result.metric, metrics)
 
 
 Driver: TypeAlias = Callable[
@@ -242,12 +249,13 @@ def rescored(
     roads: Sequence[Road | Scenarios],
     units: dict[str, str],
     metric: str,
+    metrics: Iterable[Metric],
     limited: Iterable[str] = (),
 ) -> Rescore:
     """The metrics of the vehicle before and after on roads or in scenarios, with the values that are limited."""
     runs, names = [drive(road) for road in roads], dict.fromkeys([*units, *limited])
     before, after = ({name: np.array([float(pair[side][name]) for pair in runs]) for name in names} for side in (0, 1))
-    return Rescore(before, after, units, metric)
+    return Rescore(before, after, units, metric, frozenset(m.name for m in metrics if m.statistic.signed))
 
 
 def other_roads(road: Road | Scenarios, numbers: Sequence[int]) -> list[Road | Scenarios]:

@@ -14,7 +14,6 @@ from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, typeset_unit, with_unit
 from jaxdamp._types import Figure
-from jaxdamp._warned import warn
 from jaxdamp.tune.combinations import Combinations
 from jaxdamp.tune.limits import LimitRange, written
 from jaxdamp.tune.objective import Objective, Targets
@@ -22,7 +21,7 @@ from jaxdamp.tune.ranges import Change
 from jaxdamp.tune.rescoring import Rescore, Spectrum, spectra
 from jaxdamp.tune.scenarios import Road
 from jaxdamp.tune.settings import Run
-from jaxdamp.tune.verdict import Verdict, at_limit, change_in_percent, mean_change, relative_change, verdict_of
+from jaxdamp.tune.verdict import Verdict, at_limit, change_in_percent, mean_change, verdict_of
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -159,7 +158,7 @@ class TuneResult(AbstractResult, Generic[V]):
     def ending(self) -> str:
         """The change on the road of the tuning, bounds and limits with their price, and extreme scenarios, in words."""
         before, after, unit = self.before[self.metric], self.after[self.metric], self.units[self.metric]
-        change = relative_change(before, after)
+        change = change_in_percent(self, self.metric, before, after)
         share = "" if change is None else f" ({change:+.1f} %)"
         stops = [f"{name} {at_limit(self, name)}" for name in self.active_limits]
         at_bounds = [f"{change.name} {change.note}" for change in self.parameters if change.note]
@@ -189,13 +188,6 @@ class TuneResult(AbstractResult, Generic[V]):
     def sentences(self) -> tuple[str, ...]:
         """The effects of the tolerances in words, the largest first."""
         return tuple(effect.sentence(self.metric) for effect in self.tolerances)
-
-    @property
-    def tuning(self) -> "TuneResult[V]":
-        """Deprecated: the result of `robust` is that of `minimise` with `tolerances`."""
-        text = "`tuning` is deprecated: the result of `robust` is itself a tuning."
-        warn(text, DeprecationWarning)
-        return self
 
     def table(self) -> Table:
         """The ride metrics before and after, with notes on the minimised metric and on limits.

@@ -58,6 +58,23 @@ def test_how_to_read_stands_at_the_top_or_with_the_damper(tree, tmp_path):
     assert rate(read_dampers(tree, each="folder", units={"force": "kN"})["day 9/damper 1"]) == 1001e3
 
 
+def test_a_manifest_is_taken_as_by_read(tree, tmp_path, monkeypatch):
+    top = tmp_path / "line"
+    os.system(f"cp -r '{tree}' '{top}'")
+    (top / "jaxdamp.toml").write_text('units = {force = "kN"}\n')
+    (top / "how.toml").write_text('units = {force = "daN"}\n')
+    monkeypatch.chdir(top)
+    rates = []
+    for manifest in (True, False, None, "how.toml", top / "how.toml"):
+        dampers = read_dampers(top, each="folder", manifest=manifest)
+        with monkeypatch.context() as elsewhere:
+            elsewhere.chdir(tmp_path)
+            rates.append(rate(dampers["day 9/damper 1"]))
+    assert rates == [1001e3, 1001.0, 1001.0, 10010.0, 10010.0]
+    with pytest.raises(FileNotFoundError, match=r"no manifest 'that\.toml', nor in"):
+        read_dampers(top, each="folder", manifest="that.toml")
+
+
 def test_another_way_of_reading_changes_every_stamp(tree, tmp_path):
     def stamps(**options: Any) -> tuple[str, ...]:
         dampers = read_dampers(tree, each="folder", **options)

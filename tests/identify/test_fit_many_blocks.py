@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 import xarray
 
+from jaxdamp._types import Number
 from jaxdamp.bench import BenchRun, DamperRecords, SineTest, VirtualDyno
-from jaxdamp.dampers import Bilinear
+from jaxdamp.dampers import AbstractDamper, AbstractMemoryless, Bilinear
 from jaxdamp.identify import Status, control_charts, fit_many, many, many_blocks
 from jaxdamp.identify.many_blocks import DamperFits
+from jaxdamp.parameters import parameter, positive
 
 
 START = Bilinear(1500.0, 1500.0)
@@ -158,8 +160,32 @@ def test_what_a_file_system_says_is_tried_again(tmp_path):
     with pytest.warns(UserWarning, match="1 of 4 dampers were left out: 2"):
         line = fit_many(START, dampers, file=tmp_path / "line.zarr")
     assert line.reasons[2] == "the share is away The next call tries it again."
+    for _ in range(3):
+        with pytest.warns(UserWarning, match="1 of 4 dampers were left out: 2"):
+            fit_many(START, dampers, file=tmp_path / "line.zarr")
+    assert xarray.open_zarr(tmp_path / "line.zarr", consolidated=False).sizes["damper"] == 16  # a block for another try
     away.clear()
     assert fit_many(START, dampers, file=tmp_path / "line.zarr").converged
+
+
+def own_law(factor: float) -> AbstractDamper:
+    """A law of one's own whose code is edited between two calls."""
+
+    class Mine(AbstractMemoryless):
+        rate: Number = parameter("N s/m", "damping coefficient", positive)
+
+        def force_velocity(self, v):
+            return factor * self.rate * v
+
+    return Mine(1500.0)
+
+
+def test_another_code_of_a_law_of_ones_own_is_other_work(tmp_path):
+    dampers = DamperRecords(made, range(3))
+    first = fit_many(own_law(1.0), dampers, file=tmp_path / "line.zarr")
+    np.testing.assert_array_equal(fit_many(own_law(1.0), dampers, file=tmp_path / "line.zarr").values, first.values)
+    with pytest.raises(ValueError, match=r"other work: code is \w+ there, \w+ now"):
+        fit_many(own_law(2.0), dampers, file=tmp_path / "line.zarr")
 
 
 def test_records_left_out_are_said_and_are_those_of_no_fit(tmp_path):
@@ -183,6 +209,10 @@ def test_a_store_without_a_fit_is_described(tmp_path):
     assert line.summary == words and repr(line).startswith(words)
     assert json.loads(json.dumps(line.to_dict(), allow_nan=False))["dampers"]["0"]["status"] == "left_out"
     settled = dataclasses.replace(line, settings=(0.0, 1.0, 2.0))
+    with pytest.raises(
+        ValueError, match=r"`setting` must lie between dampers that were fitted, and none was, .*its block"
+    ):
+        settled.law_at(0.5)
     assert settled.unusual == ("0", "1", "2") and len(settled.table().rows) == 3
     with pytest.raises(ValueError, match=r"`dampers` must hold a number .*, but is Bilinear: none of 3 dampers"):
         control_charts(line, 3)

@@ -131,8 +131,6 @@ def test_a_fit_responds_with_what_the_machine_adds(sines):
     np.testing.assert_allclose(force[:3] - alone, 100.0, atol=2.0)
     np.testing.assert_array_equal(force, result.respond([new])[0])
     assert result.score(new)[1] == pytest.approx(5.0, rel=0.1)
-    with pytest.warns(DeprecationWarning, match="`predict` is deprecated"):
-        np.testing.assert_array_equal(result.predict(new)[0], force)
 
 
 def test_main_warnings_name_groups_once(sines):

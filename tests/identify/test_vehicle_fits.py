@@ -83,8 +83,6 @@ def test_a_fitted_vehicle_predicts_a_record_that_it_was_not_fitted_to(motions, r
     how = {"sampling_rate": 250.0, "finer": 4, "sensors": SENSORS, "name": "new", "seed": 3}
     new = identify.virtual_ride(CAR, SWEEP, NOISE, **how)
     assert {s.channel: s.rmse for s in motions.score([new])} == pytest.approx(rows, rel=0.1)
-    with pytest.warns(DeprecationWarning, match="write `respond"):
-        np.testing.assert_array_equal(motions.predict()["sweep"]["stroke"], motions.respond(record)["stroke"])
 
 
 @pytest.mark.exhaustive

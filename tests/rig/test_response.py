@@ -163,7 +163,6 @@ def test_times_of_day_in_single_precision():
         ({"substeps": 0}, "`substeps` must be 1 or more, but is 0"),
     ],
 )
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_refusals(change, message):
     arguments = {"time": np.linspace(0.0, 0.3, 4), "stroke": np.zeros(4), "velocity": np.zeros(4)} | change
     lengths = {np.shape(arguments[name]) for name in ("time", "stroke", "velocity")}

@@ -72,10 +72,19 @@ def test_other_roads_stand_in_a_table_but_for_what_has_no_change() -> None:
     assert data["metrics"]["lift_off_fraction"] == {"before": [0.0, 0.1], "after": [0.1, 0.1], "unit": ""}
 
 
-def test_old_public_names_still_work_with_a_warning() -> None:
-    with pytest.warns(DeprecationWarning, match="no public name any more"):
-        assert tune.Change is Change
+def test_metrics_that_may_be_negative_have_no_change_in_percent() -> None:
+    names = {"maximum_stroke": [1e-5, 2e-3], "grip": [2.0, 4.0]}
+    before = {name: np.array(values) for name, values in names.items()}
+    after = {"maximum_stroke": np.array([-1e-3, 1e-3]), "grip": np.array([1.0, 3.0])}
+    signed = Rescore(
+        before, after, {"maximum_stroke": "m", "grip": "N"}, "maximum_stroke", frozenset(["maximum_stroke"])
+    )
+    assert signed.summary == "On 2 of 2 roads maximum_stroke decreases, from 0.001005 to 0 m on average."
+    assert [row["metric"] for row in signed.table().records()] == ["grip"]
+    none = Rescore({"grip": np.zeros(2)}, {"grip": np.array([0.0, 1.0])}, {"grip": "N"}, "grip")
+    assert none.summary == "On 0 of 2 roads grip decreases, from 0 to 0.5 N on average."
+
+
+def test_unknown_names_are_answered() -> None:
     with pytest.raises(AttributeError, match="no attribute 'Chance'"):
         _ = tune.Chance
-    with pytest.warns(DeprecationWarning, match="itself a tuning"):
-        assert RESULT.tuning is RESULT

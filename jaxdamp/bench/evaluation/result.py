@@ -182,7 +182,7 @@ class Evaluation(AbstractResult):
         """All measurements as plain data."""
         return {"method": self.method, "notes": list(self.notes), "measurements": plain(self._list().records())}
 
-    def plot(self, kind: "str | Evaluation" = "cycles", **options: object) -> Figure:
+    def plot(self, kind: str = "cycles", **options: object) -> Figure:
         """Mean loops over velocity, stroke, acceleration and time, and forces over velocity; or the damper's sheet.
 
         Arguments:
@@ -191,7 +191,7 @@ class Evaluation(AbstractResult):
         """
         from jaxdamp import plots
 
-        return plotted(kind, {"cycles": plots.evaluation, "sheet": plots.damper_sheet}, self, "baseline", **options)
+        return plotted(kind, {"cycles": plots.evaluation, "sheet": plots.damper_sheet}, self, **options)
 
     def __repr__(self) -> str:
         return "\n\n".join([*(str(t) for name, t in self.tables().items() if name != "measurements"), *self.notes])

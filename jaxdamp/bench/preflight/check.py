@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
-from jaxdamp._results import AbstractResult, CallableText, drawn_by
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Cell, Column, Contents, Table, plain
 from jaxdamp.bench.analysis import as_records, peak_velocity_points
 from jaxdamp.bench.contradictions import contradictions
@@ -100,12 +100,12 @@ class Preflight(AbstractResult):
         return tuple(sentence for sentence in self.sentences() if not sentence.startswith("note"))
 
     @property
-    def summary(self) -> CallableText:
+    def summary(self) -> str:
         """How many records were checked, and how much was found, in words."""
         counts = [(len(self.of(severity)), severity) for severity in SEVERITIES]
         words = ", ".join(f"{count} {severity}{'s' * (count > 1)}" for count, severity in counts if count)
         records = f"{len(self.records)} record{'s' * (len(self.records) > 1)}"
-        return CallableText(f"Preflight of {records}: {words or 'nothing odd'}")
+        return f"Preflight of {records}: {words or 'nothing odd'}"
 
     def sentences(self) -> list[str]:
         """Each kind of finding once, worst first: in how many records, and that with the largest size in words."""
