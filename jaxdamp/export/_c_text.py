@@ -8,6 +8,7 @@ import jax
 import numpy as np
 from jaxtyping import PyTree
 
+from jaxdamp import _checks
 from jaxdamp.codegen import C, PrintedFunction, Program
 from jaxdamp.export._controlled_program import ControlledProgram
 from jaxdamp.export._controller_program import ControllerProgram, Line
@@ -257,14 +258,19 @@ def _constants(program: VehicleProgram, prefix: str) -> list[tuple[str, float, s
     sizes += [("MATRICES", program.sizes["m"]), ("CARRY", program.sizes["c"])]
     constants: list[tuple[str, float, str]] = [(f"{prefix}_{key}", value, "") for key, value in sizes]
     constants.append((f"{prefix}_LONGEST_STEP", program.longest_step, "s, of laws as they are exported"))
-    return constants + _numbered(f"{prefix}_Y", program.channels)
+    return constants + numbered(f"{prefix}_Y", program.channels)
 
 
-def _numbered(prefix: str, lines: Sequence[Channel] | Sequence[Line]) -> list[tuple[str, float, str]]:
+def numbered(prefix: str, lines: Sequence[Channel] | Sequence[Line]) -> list[tuple[str, float, str]]:
     """The number of each entry of an array."""
+    names: dict[str, str] = {}
+    for line in lines:
+        if (other := names.setdefault(identifier(line.name).upper(), line.name)) != line.name:
+            must = "have channels with names that differ in C, by more than case and special characters"
+            _checks.refuse("law", must, f"one with {other!r} and {line.name!r}", "Rename a part of the vehicle.")
     return [
-        (f"{prefix}_{identifier(line.name).upper()}", k, f"[{line.unit or '-'}] {line.description}")
-        for k, line in enumerate(lines)
+        (f"{prefix}_{key}", k, comment(f"[{line.unit or '-'}] {line.description}"))
+        for k, (key, line) in enumerate(zip(names, lines, strict=True))
     ]
 
 
@@ -283,7 +289,7 @@ def controller_source(program: ControllerProgram, name: str) -> CSource:
     sizes = {"INPUTS": len(program.inputs), "OUTPUTS": len(program.outputs)}
     sizes |= {"MATRICES": program.sizes["m"], "CARRY": program.sizes["c"]}
     constants = [(f"{upper}_{key}", value, "") for key, value in sizes.items()]
-    constants += _numbered(f"{upper}_U", program.inputs) + _numbered(f"{upper}_Y", program.outputs)
+    constants += numbered(f"{upper}_U", program.inputs) + numbered(f"{upper}_Y", program.outputs)
     about = [
         f"Controller of {', '.join(program.dampers)}: {program.vehicle.policy!r}",
         "",

@@ -17,6 +17,8 @@ from jaxdamp.dampers import (
     PiecewiseLinear,
 )
 from jaxdamp.export import to_c
+from jaxdamp.export._c_text import numbered
+from jaxdamp.export._controller_program import Line
 from jaxdamp.export._law_program import identifier
 from jaxdamp.parameters import parameter
 from jaxdamp.simulation import substeps_needed
@@ -117,6 +119,14 @@ def test_a_test_program_replaces_its_like_and_no_other_export(tmp_path):
     for rate in (1111.0, 2222.0):
         source = to_c(Linear(rate), tmp_path / "front.c")[1].read_text(encoding="utf-8")
     assert "2222" in source
+
+
+def test_names_that_are_one_in_c_are_refused_and_comments_are_closed():
+    lines = [Line("f_stroke", "m", "of */ x"), Line("front axle_stroke", "m", "")]
+    assert numbered("CAR_Y", lines)[0] == ("CAR_Y_F_STROKE", 0, "[m] of * / x")
+    for name in ("F_stroke", "front-axle_stroke"):
+        with pytest.raises(ValueError, match=f"names that differ in C, .* but is one with '.*' and '{name}'. Rename"):
+            numbered("CAR_Y", [*lines, Line(name, "m", "")])
 
 
 def test_refusals(tmp_path):
