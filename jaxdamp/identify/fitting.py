@@ -95,7 +95,8 @@ def of_any_records(
                 return cast(Any, vehicle)(model, records, **given)
             if isinstance(records, Mapping):
                 return cast(Any, many)(model, records, **given)
-            if given.pop("scheduled", False):
+            if settings.pop("scheduled", False):
+                del given["scheduled"]
                 from jaxdamp.identify.scheduling import fit_scheduled  # which is made of fits of a law
 
                 return fit_scheduled(cast(Any, model), cast(Any, records), **given)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from typing import Any
 
 import pytest
 
@@ -137,3 +138,9 @@ def test_a_comparison_says_that_its_records_cannot_choose(sines):
     laws = identify.default_ladder(runs, ["linear", "bilinear"])
     said = identify.compare(laws, runs).verdict[1]
     assert said.startswith("With 2 numbers it is the simplest of linear and bilinear, which predict alike")
+
+
+def test_without_settings_a_fit_is_one_of_a_law() -> None:
+    runs = VirtualDyno(Linear(1500.0), sampling_rate=100.0).run(SineTest(0.01, 1.0))
+    how: Any = {"scheduled": False}
+    assert float(identify.fit(Linear, runs, **how).law.rate) == pytest.approx(1500.0)
