@@ -88,18 +88,21 @@ class Controlled(AbstractVehicle):
             remedy = "Give the policies of all dampers to one: `policy={'front_damper': ..., 'rear_damper': ...}`."
             _checks.refuse("car", "have no controller yet", f"a {type(self.car).__name__}", remedy)
         _checks.positive("period", self.period)
-        if not self.delay >= 0.0:
-            _checks.refuse("delay", "not be negative", self.delay)
+        _checks.nonnegative("delay", self.delay)
+        _checks.positive("still", self.still)
+        must, such = "be a policy, or a dict of policies by names of dampers", "Such as `control.Skyhook()`."
+        _checks.instance("policy", self.policy, (AbstractPolicy, AbstractVehiclePolicy, dict), must, such)
         forces = _forces_at_levels(self.car, self.still)
         if not forces:
             remedy = "Make its damper `dampers.Scheduled((soft, hard), levels=[0.0, 1.0], command=0.0)`."
             must = "have a damper with one `Scheduled` law, which takes a command"
             _checks.refuse("car", must, ", ".join(self.car.layout.ports), remedy)
-        if not isinstance(self.policy, AbstractPolicy | AbstractVehiclePolicy):
+        if isinstance(self.policy, dict):
+            if not self.policy:
+                _checks.refuse("policy", "hold a policy of one damper or more", self.policy, such)
             for name, policy in self.policy.items():
                 _checks.one_of("policy", name, forces)
-                must, remedy = "be a policy", "Such as `control.Skyhook()`."
-                _checks.instance(f"policy[{name!r}]", policy, AbstractPolicy, must, remedy)
+                _checks.instance(f"policy[{name!r}]", policy, AbstractPolicy, "be a policy", such)
         dampers, policy = self.commanded(list(forces))
         policy.sampled(self.period).initial_state(dampers)  # refuses what does not suit the vehicle or the period
         for name in self.sensors if isinstance(self.sensors, dict) else ():

@@ -29,9 +29,9 @@ def as_signal(argument: str, signal: SignalLike, *, least: int = 1) -> Signal:
 
 
 def as_numbers(*values: ArrayLike) -> list[Array]:
-    """Numbers or arrays of them as floats of one type, the one that JAX finds for all."""
+    """Numbers, lists or arrays of them as floats of one type, the one that JAX finds for all."""
     refuse_fork()
-    dtype = jnp.result_type(*values)
+    dtype = jnp.result_type(*jax.tree.leaves(values) or [float])
     dtype = dtype if jnp.issubdtype(dtype, jnp.floating) else jnp.result_type(float)
     return [jnp.asarray(value, dtype) for value in values]
 
@@ -46,6 +46,13 @@ def same_length(first: str, one: Signal, second: str, other: Signal) -> None:
 def check_interval(dt: ScalarLike | int) -> None:
     """Refuse a sampling interval that is not positive and finite."""
     _checks.positive("dt", dt, "It is the sampling interval in s.")
+
+
+def check_increasing(frequency: Float[Array, " lines"]) -> None:
+    """Refuse known frequencies that do not increase."""
+    known = _checks.concrete(frequency)
+    if known is not None and not (known[1:] > known[:-1]).all():
+        _checks.refuse("frequency", "increase", f"{known[0]:g} to {known[-1]:g} Hz in another order", "Sort the lines.")
 
 
 class StateSpace(NamedTuple):

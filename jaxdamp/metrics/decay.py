@@ -100,9 +100,10 @@ def logarithmic_decrement(signal: SignalLike, *, final: ScalarLike | int = 0.0, 
     """Logarithmic decrement of a free decay, delta = ln(x_k/x_{k+1}) per full cycle [-].
 
     Twice the slope of a straight line through ln |x - final| of all successive turning points, highs and lows, that
-    exceed `threshold` times the largest; each turning point is refined by a parabola through three samples. Highs and
-    lows share the line, so an asymmetric damper gives the mean of its two directions. NaN with fewer than two turning
-    points. Differentiable, but it jumps where a turning point enters or leaves.
+    exceed `threshold` times the largest; each turning point is refined by a parabola through three samples. Equal
+    samples at the top, as in a digitised record, are one turning point. Highs and lows share the line, so an asymmetric
+    damper gives the mean of its two directions. NaN with fewer than two turning points. Differentiable, but it jumps
+    where a turning point enters or leaves.
 
     Arguments:
         signal: the free motion, shape [time], any unit; one mode, smooth enough that noise makes no turning points.
@@ -129,9 +130,9 @@ def logarithmic_decrement(signal: SignalLike, *, final: ScalarLike | int = 0.0, 
 def _decrement(y: Signal, threshold: Scalar) -> Scalar:
     before, here, after = y[:-2], y[1:-1], y[2:]
     rise = jnp.diff(y)
-    beyond = jnp.concatenate([rise[2:], jnp.zeros(1, y.dtype)])
-    turns = rise[:-1] * rise[1:] < 0.0
-    turns |= (rise[1:] == 0.0) & (rise[:-1] * beyond < 0.0)  # two equal samples at the top: the first counts
+    # of equal samples at the top, as of a digitised record, the first counts, if the next change turns back
+    changes = jnp.where(rise == 0.0, rise.size - 1, jnp.arange(rise.size))
+    turns = rise[:-1] * rise[jax.lax.cummin(changes, reverse=True)[1:]] < 0.0
     bend = before - 2.0 * here + after
     lift = (after - before) ** 2 / jnp.where(turns, -8.0 * bend, jnp.ones_like(bend))
     height = jnp.where(turns, jnp.abs(here + lift), jnp.zeros_like(here))

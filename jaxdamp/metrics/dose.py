@@ -8,7 +8,7 @@ from jaxtyping import Array, ArrayLike, Float, Int, PyTree
 from jaxdamp import _checks
 from jaxdamp._limits import at_most, largest, root
 from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
-from jaxdamp.metrics._signals import as_numbers, as_signal, check_interval, quotient, respond_as_lag
+from jaxdamp.metrics._signals import as_numbers, as_signal, check_increasing, check_interval, quotient, respond_as_lag
 from jaxdamp.metrics.weighted import as_weighted, check_weighting, weighting_factor
 
 
@@ -267,9 +267,7 @@ def third_octave_rms(
     if lines.ndim != 1 or lines.shape != levels.shape or lines.size < 2:
         shapes = f"of shapes {lines.shape} and {levels.shape}"
         _checks.refuse("density", "have one axis of two lines or more, as `frequency`", shapes)
-    known = _checks.concrete(lines)
-    if known is not None and not (known[1:] > known[:-1]).all():
-        _checks.refuse("frequency", "increase", f"{known[0]:g} to {known[-1]:g} Hz in another order")
+    check_increasing(lines)
     if weighting is not None:
         check_weighting(weighting)
     return jnp.asarray(10.0 ** (_NUMBERS / 10.0), lines.dtype), _in_bands(lines, levels, weighting)

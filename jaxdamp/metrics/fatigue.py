@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Scalar, ScalarLike, SignalLike, VectorLike
-from jaxdamp.metrics._signals import as_signal, same_length
+from jaxdamp.metrics._signals import as_signal, check_increasing, same_length
 
 
 @final
@@ -79,6 +79,8 @@ def rainflow_cycles(signal: VectorLike) -> RainflowCycles:
     except ImportError as error:
         raise ImportError("`rainflow_cycles` needs rainflow: pip install 'jaxdamp[fatigue]'.") from error
 
+    if load.size == 2:  # the package counts nothing of two samples
+        load = np.linspace(load[0], load[1], 3)
     found = np.array([cycle[:3] for cycle in rainflow.extract_cycles(load.tolist())], float).reshape(-1, 3)
     return RainflowCycles(0.5 * found[:, 0], found[:, 1], found[:, 2])
 
@@ -98,7 +100,8 @@ def spectral_moments(
         orders: the orders n, not negative.
 
     Raises:
-        ValueError: if the lengths differ, if there are fewer than two frequencies, or if an order is negative.
+        ValueError: if the lengths differ, if there are fewer than two frequencies, if they do not increase, or if an
+            order is negative.
 
     >>> f = jnp.linspace(0.0, 10.0, 1001)
     >>> spectral_moments(f, jnp.where(f >= 0.0, 2.0, 0.0)).round(1)  # flat: 2 * 10^(n+1)/(n+1)
@@ -106,6 +109,7 @@ def spectral_moments(
     """
     f, g = as_signal("frequency", frequency, least=2), as_signal("density", density, least=2)
     same_length("frequency", f, "density", g)
+    check_increasing(f)
     if min(orders) < 0:
         _checks.refuse("orders", "not be negative", orders)
     powers = [jnp.ones_like(f) if n == 0 else f**n for n in orders]
@@ -138,8 +142,8 @@ def spectral_damage(
         method: "dirlik" or "narrow-band".
 
     Raises:
-        ValueError: if the lengths differ, there are fewer than two frequencies, `exponent` is not positive, or
-            `method` is unknown.
+        ValueError: if the lengths differ, there are fewer than two frequencies or they do not increase, `exponent` is
+            not positive, or `method` is unknown.
 
     Source: Dirlik, thesis, University of Warwick 1985, as in public implementations.
 

@@ -84,6 +84,8 @@ def welch_plan(
     check_interval(dt)
     _checks.untraced("segment_length", segment_length, "It is part of a compiled program: give a plain number.")
     size = max(2, signal.size // 8) if segment_length is None else segment_length
+    if not isinstance(size, int | np.integer):
+        _checks.refuse("segment_length", "be a whole number of samples", repr(size), "Write 256, not 256.0.")
     if not 2 <= size <= signal.size:
         remedy = "Shorten the segments."
         _checks.refuse("segment_length", f"lie between 2 and the length of the signal ({signal.size})", size, remedy)

@@ -206,6 +206,18 @@ def _dimensionless(_: str) -> str:
     return ""
 
 
+def _of_power(unit: str) -> str:
+    return "W" if unit in ("N m/s", "m/s N", "N m rad/s", "rad/s N m") else unit
+
+
+def _of_dose(unit: str) -> str:
+    """The unit times s^0.25."""
+    for per_time, rest in (("/s^2", "/s^1.75"), ("/s", "/s^0.75")):
+        if unit.endswith(per_time):
+            return unit.removesuffix(per_time) + rest
+    return f"{unit} s^0.25".strip()
+
+
 # Sums about the first sample avoid loss of digits if the mean is large.
 _SPREAD = (
     Term(Reduction.FIRST),
@@ -242,18 +254,18 @@ _ALL = (
         "dissipated_power",
         (Term(Reduction.SUM), Term(Reduction.FIRST), Term(Reduction.LAST)),
         _power,
-        unit=lambda _: "W",
+        unit=_of_power,
     ),
     Statistic(
         "vibration_dose_value",
         (Term(Reduction.SUM, lambda y, _: (y * y) ** 2),),
         lambda gathered, _, dt: root(gathered[0] * jnp.asarray(dt, gathered[0].dtype), 4),
-        unit=lambda unit: unit.replace("^2", "^1.75"),
+        unit=_of_dose,
     ),
     Statistic("max_transient_value", of_record=lambda record, dt: max_transient_value(record, dt, None)),
 )
 # By name. `lift_off_fraction` and `road_stress_factor` are of a tyre's load beyond its static load over its static
-# load; `dissipated_power` is of the product of a force and its velocity.
+# load; `dissipated_power` is of the product of a force and its velocity, of another channel its mean.
 STATISTICS: dict[str, Statistic] = {statistic.name: statistic for statistic in _ALL}
 
 

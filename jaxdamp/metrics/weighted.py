@@ -61,7 +61,8 @@ def sections(weighting: str) -> tuple[Section, ...]:
 def check_weighting(weighting: str) -> None:
     """Refuse an unknown weighting and name the nearest."""
     if weighting not in _WEIGHTINGS:
-        near = f"W{weighting.strip()[-1:].lower()}"  # the last letter tells: "wk", "W_k", "ISO Wk"
+        letter = weighting.strip()[-1:] if isinstance(weighting, str) else ""  # it tells: "wk", "W_k", "ISO Wk"
+        near = f"W{letter.lower()}"
         hint = f"Did you mean {near!r}?" if near in _WEIGHTINGS else ""
         _checks.refuse("weighting", f"be one of {', '.join(map(repr, _WEIGHTINGS))}", repr(weighting), hint)
 
@@ -289,18 +290,25 @@ def _filtered(signal: Signal, response: jax.Array) -> Signal:
     return jnp.fft.irfft(jnp.fft.rfft(signal, size) * response, size)[: signal.size]
 
 
-def as_weighted(acceleration: SignalLike, dt: ScalarLike | int, weighting: str | None) -> Signal:
+def as_weighted(
+    acceleration: SignalLike,
+    dt: ScalarLike | int,
+    weighting: str | None,
+    *,
+    method: str = "spectrum",
+    remove_mean: bool = True,
+) -> Signal:
     """The weighted record; as it is for the weighting `None`."""
     check_interval(dt)
     if weighting is None:
         return as_signal("acceleration", acceleration, least=2)
-    return weighted_signal(acceleration, dt, weighting)
+    return weighted_signal(acceleration, dt, weighting, method=method, remove_mean=remove_mean)
 
 
 def weighted_rms(
     acceleration: SignalLike,
     dt: ScalarLike | int,
-    weighting: str,
+    weighting: str | None,
     *,
     method: str = "spectrum",
     remove_mean: bool = True,
@@ -313,7 +321,8 @@ def weighted_rms(
     Arguments:
         acceleration: acceleration [m/s^2] or angular acceleration [rad/s^2], shape [time].
         dt: the sampling interval [s].
-        weighting: "Wb", "Wc", "Wd", "We", "Wf", "Wj" or "Wk"; see `weighting_response`.
+        weighting: "Wk" and so on (see `weighting_response`), or None for a record that is weighted already, which is
+            taken as it is.
         method: "spectrum" or "step"; see `weighted_signal`.
         remove_mean: whether to subtract the mean of the record first.
 
@@ -326,4 +335,4 @@ def weighted_rms(
     >>> round(float(weighted_rms(jnp.sin(2.0 * jnp.pi * 8.0 * time), 0.001, "Wk")), 3)  # 1.036/sqrt(2)
     0.732
     """
-    return rms(weighted_signal(acceleration, dt, weighting, method=method, remove_mean=remove_mean))
+    return rms(as_weighted(acceleration, dt, weighting, method=method, remove_mean=remove_mean))

@@ -12,7 +12,7 @@ from jaxdamp import _checks
 from jaxdamp._limits import at_least, at_most
 from jaxdamp._traced import behind
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
-from jaxdamp.roads.base import AbstractRoad, Columns
+from jaxdamp.roads.base import AbstractRoad, Columns, check_speed
 
 
 class AbstractOnOneRoad(AbstractRoad):
@@ -42,7 +42,7 @@ def agreed_speed(road: AbstractRoad, speed: ScalarLike | int | None, wanted_with
         _checks.refuse("speed", f"be given with `{wanted_with}`", speed, "Give the speed of the vehicle in m/s.")
     if speed is None:
         return jnp.asarray(own, float)
-    _checks.positive("speed", speed, "Roads are driven forwards.")
+    check_speed(speed)
     mine, its = _checks.concrete(speed), None if own is None else _checks.concrete(own)
     if mine is not None and its is not None and not np.allclose(mine, its, rtol=1e-6, atol=0.0):
         _checks.refuse("speed", f"be that of the road, {its} m/s", f"{mine} m/s", "Leave it out, or remake the road.")

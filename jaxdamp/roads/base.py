@@ -65,8 +65,15 @@ def given_in_time(
     if speed is None:
         _checks.refuse("speed", f"be given with `{distance_name}`", speed, "Give the speed of the vehicle in m/s.")
     _checks.positive(distance_name, distance)
-    _checks.positive("speed", speed, "Roads are driven forwards.")
+    check_speed(speed)
     return False
+
+
+def check_speed(speed: ScalarLike | int, remedy: str = "Roads are driven forwards.") -> None:
+    """Refuse a speed that is not one positive number."""
+    if np.shape(speed):
+        _checks.refuse("speed", "be one number", f"of shape {np.shape(speed)}", "Use `jax.vmap` for many.")
+    _checks.positive("speed", speed, remedy)
 
 
 class Columns(NamedTuple):
@@ -171,8 +178,13 @@ class AbstractRoad(eqx.Module):
 
     @property
     def duration(self) -> float | None:
-        """The time [s] after which the road ends or repeats; `None` if it does neither, or if its speed is traced."""
-        return _least(road.duration for road in self._parts)
+        """The time [s] after which the road ends or repeats; `None` if it does neither, or if its speed is traced.
+
+        A road that is made of others lasts until the first of them ends, however often a periodic one repeats before.
+        """
+        ending = [road for road in self._parts if np.any(_checks.concrete(road.span[1]) != math.inf)]
+        longest = [self.longest_run] if ending else []
+        return _least([*(road.duration for road in ending or self._parts), *longest])
 
     @property
     def span(self) -> tuple[Scalar | float, Scalar | float]:

@@ -20,7 +20,7 @@ from jaxdamp.roads.assessment import (
     displacement_psd,
     roughness,
 )
-from jaxdamp.roads.base import AbstractRoad, fade_in
+from jaxdamp.roads.base import AbstractRoad, check_speed, fade_in
 
 
 Lines = Float[Array, " lines"]
@@ -279,7 +279,7 @@ def iso8608(
             f"{band[0]} cycle/m",
             "Exchange them, or widen the band.",
         )
-    _checks.positive("speed", speed, "Roads are driven forwards; it is in m/s.")
+    check_speed(speed, "Roads are driven forwards; it is in m/s.")
     _checks.nonnegative("waviness", waviness, "The standard uses 2.")
     _checks.nonnegative("ramp", ramp, "Use 0 for no fade-in.")
     _checks.one_of("amplitudes", amplitudes, ["random", "fixed"])

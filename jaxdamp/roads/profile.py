@@ -7,6 +7,7 @@ from jaxtyping import ArrayLike, Float
 from jaxdamp import _checks
 from jaxdamp._types import ScalarLike
 from jaxdamp.roads._sampled import SampledRoad
+from jaxdamp.roads.base import check_speed
 
 
 # Largest departure from a uniform grid that is taken for rounding in the file, as part of one step.
@@ -42,8 +43,8 @@ def from_profile(
 
     Raises:
         ValueError: if lengths differ, if there are fewer than two samples, if anything is NaN or infinite, if
-            `position` does not increase or its steps are not equal, if `speed` is not positive, or if `ramp` is
-            negative.
+            `position` does not increase or its steps are not equal, if `speed` is not one positive number, or if
+            `ramp` is negative.
 
     >>> import jax.numpy as jnp
     >>> ramp_up = from_profile(jnp.arange(4.0), jnp.array([0.0, 0.0, 0.1, 0.1]), speed=10.0)
@@ -55,7 +56,7 @@ def from_profile(
     _checks.untraced("position", position, "The samples may be traced, not their places.")
     spacing = _uniform_spacing(np.asarray(position, float))
     heights = jnp.asarray(height, float)
-    if heights.shape[0] != np.size(position):
+    if heights.ndim not in (1, 2) or heights.shape[0] != np.size(position):
         _checks.refuse(
             "height",
             f"hold one value per position ({np.size(position)})",
@@ -64,7 +65,7 @@ def from_profile(
         )
     _refuse_gaps("height", _checks.concrete(heights))
     if speed is not None:
-        _checks.positive("speed", speed, "Roads are driven forwards: reverse the arrays instead.")
+        check_speed(speed, "Roads are driven forwards: reverse the arrays instead.")
     _checks.nonnegative("ramp", ramp, "Use 0 for no fade-in.")
     return SampledRoad(
         samples=heights[:, None] if heights.ndim == 1 else heights,
@@ -76,8 +77,8 @@ def from_profile(
 
 
 def _uniform_spacing(position: np.ndarray) -> float:
-    if position.size < 2:
-        _checks.refuse("position", "hold at least two samples", f"of length {position.size}")
+    if position.ndim != 1 or position.size < 2:
+        _checks.refuse("position", "hold at least two samples in a row", f"of shape {position.shape}")
     _refuse_gaps("position", position)
     steps = np.diff(position)
     if np.any(steps <= 0.0):

@@ -15,6 +15,7 @@ from jaxdamp._random import normal, uniform
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp.roads._sampled import AbstractProcess, SampledRoad
 from jaxdamp.roads.assessment import LOWEST_SPATIAL_FREQUENCY, REFERENCE_SPATIAL_FREQUENCY, roughness
+from jaxdamp.roads.base import check_speed
 
 
 @jax.jit(static_argnames=("first", "size"))
@@ -237,7 +238,7 @@ def iso8608_filtered(
     (0.0175, 0.0191)
     """
     density = roughness(road_class)
-    _checks.positive("speed", speed, "Roads are driven forwards; it is in m/s.")
+    check_speed(speed, "Roads are driven forwards; it is in m/s.")
     _checks.positive("cutoff", cutoff, "Without a cut-off the variance of the road grows without end.")
     _checks.positive("spacing", spacing)
     _checks.nonnegative("ramp", ramp, "Use 0 for no fade-in.")
@@ -311,6 +312,6 @@ def white(road_class: str | ScalarLike, speed: ScalarLike) -> WhiteRoad:
     >>> round(float(white("C", speed=20.0).velocity_psd), 9)
     0.001010647
     """
-    _checks.positive("speed", speed)
+    check_speed(speed)
     density = 2.0 * np.pi**2 * roughness(road_class) * REFERENCE_SPATIAL_FREQUENCY**2 * speed
     return WhiteRoad(jnp.asarray(density, float), jnp.asarray(speed, float))

@@ -81,7 +81,7 @@ def read_profile(
 
 def _size_of_unit(argument: str, given: str | None, name: str, units: Mapping[str, float], path: object) -> float:
     """The unit of a column in SI: that in its name or, where this has none, the one given, or the first of `units`."""
-    written = _unit_in(name, units)
+    written = _unit_in(name)
     if not written:
         return units[given or next(iter(units))]
     size = _size(written, units)
@@ -98,13 +98,13 @@ def _size_of_unit(argument: str, given: str | None, name: str, units: Mapping[st
     return size
 
 
-def _unit_in(name: str, units: Mapping[str, float]) -> str:
-    """The unit in the name of a column, in brackets or, if it is one of `units`, behind an underscore."""
+def _unit_in(name: str) -> str:
+    """The unit in the name of a column, in brackets or, if it is of a length or a time, behind an underscore."""
     brackets = re.findall(r"[\[({]\s*([^\[\](){}]*?)\s*[\])}]", name)
     if brackets:
         return brackets[-1]
     tail = name.rpartition("_")
-    return tail[2] if tail[0] and tail[2] in units else ""
+    return tail[2] if tail[0] and tail[2] in (*_LENGTHS, *_TIMES) else ""
 
 
 def _size(written: str, units: Mapping[str, float]) -> float | None:

@@ -105,6 +105,7 @@ class Response(eqx.Module, AbstractResult):
     whole: "Response | None" = None
     begin: Int[Array, ""] | None = None
     commands: Float[Array, "time commands"] | None = None
+    _every: int = eqx.field(static=True, repr=False, default=1)  # of how many instants of the run one is saved
     histogram = Elsewhere("`jaxdamp.metrics.velocity_histogram(response['damper_velocity'], edges)`")
     _computed: _Remembered = eqx.field(init=False, repr=False, default_factory=_Remembered)
 

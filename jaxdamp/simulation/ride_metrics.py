@@ -58,19 +58,13 @@ def ride_metrics(response: "Response", names: Sequence[str | Metric] | None = No
 def comfort(response: "Response") -> dict[str, Comfort]:
     """Weighted RMS, largest second (MTVV) and VDV of every body, seat and place acceleration, by ISO 2631-1.
 
-    Weighted as in `ride_metrics`. Differentiable but for the maximum.
+    Weighted as in `ride_metrics`. Differentiable but for the maximum. Less than a second has no MTVV, which is the RMS
+    of one: NaN.
 
     Arguments:
         response: the run, or a part of it.
-
-    Raises:
-        ValueError: less than a second, over which MTVV is a mean.
     """
     layout, dt = response.system.layout, _step(response)
-    length = _checks.concrete(response.time.size * dt)
-    if length is not None and length < 1.0 - 1e-9:
-        must = "be 1 s or longer for comfort by ISO 2631-1, whose MTVV is the RMS of a second"
-        _checks.refuse("duration", must, f"{response.time.size * float(dt) - float(dt):g} s")
     names = dict.fromkeys(m.channel for m in layout.metrics if layout.by_name[m.channel].kind.weighting)
 
     def of(name: str) -> Comfort:
@@ -129,7 +123,10 @@ def _computed(
 
 @compiled_for_loops
 def _comfort(weighted: Signal, dt: ScalarLike) -> Comfort:
-    transient = metrics.max_transient_value(weighted, dt, None)
+    length, transient = (weighted.size + 0.01) * dt, jnp.asarray(jnp.nan, weighted.dtype)
+    known = _checks.concrete(length)
+    if known is None or known >= 1.0:  # a second is in it, as far as is known
+        transient = jnp.where(length < 1.0, transient, metrics.max_transient_value(weighted, dt, None))
     return Comfort(metrics.rms(weighted), transient, metrics.vibration_dose_value(weighted, dt, None))
 
 

@@ -1,7 +1,8 @@
 """`simulate`: a vehicle on a road."""
 
 import functools
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from typing import Literal, Unpack, overload
 
 import jax
@@ -70,8 +71,8 @@ def simulate(
     and a sentence in `response.notes`; `response.range_use()` has the numbers.
 
     Returns:
-        The response at `round(duration/dt) + 1` instants, or one in `every` of them and the first; with `return_state`
-        a pair of it and the state at the last instant.
+        The response at `round(duration/dt) + 1` instants, or one in `every` of them and the first; without a `duration`
+        at those up to the end of the road. With `return_state` a pair of it and the state at the last instant.
 
     Raises:
         ValueError: a step longer than the spacing of a sampled road, or too long for the vehicle; no duration, a road
@@ -116,7 +117,8 @@ def simulate(
             refuse_restless(vehicle)
         remedy = " ".join([*filter(None, map(coverage, system.laws)), engine.remedy(status, dt)])
         _checks.refuse("vehicle", "have a finite response", f"at {last} (position, rate) at the end", remedy)
-    response = Response(vehicle, system, time[::every], *saved[:5], axle_timing(vehicle, road), commands=saved.commands)
+    timing = axle_timing(vehicle, road)
+    response = Response(vehicle, system, time[::every], *saved[:5], timing, commands=saved.commands, _every=every)
     warn_outside(range_sentences(response.range_use()))
     if not return_state:
         return response
@@ -195,13 +197,16 @@ def sampled(
     Arguments:
         vehicle: any vehicle.
         road: under its wheels.
-        duration: length of the run [s].
+        duration: length of the run [s]; if left out, as many whole steps as the road has.
         dt: spacing of the instants [s].
         begins: the first instant [s] of a run that goes on; zero if left out.
     """
-    first = np.zeros(()) if begins is None else behind(begins)
+    first, beyond = np.zeros(()) if begins is None else behind(begins), 0.0
+    whole: Callable[[float], int] = round
     if duration is None and road.duration is not None and first is not None and not first.ndim:
         duration = road.duration - float(first)
+        beyond = 1e-9 * road.duration + float(np.finfo(first.dtype).eps * first)  # what rounding takes off it
+        whole = math.floor  # not beyond the road
     if duration is None:
         _checks.refuse("duration", "be given for a road without an end of its own", None, "Pass `duration=10.0`.")
     duration = _checks.plain_number("duration", duration)
@@ -221,7 +226,7 @@ def sampled(
     if event is not None and event < 2 * dt * (1 - 1e-9):
         must = f"be at most half the time over the shortest bump, {event:.3g} s, which steps would skip"
         _checks.refuse("dt", must, f"{dt:g} s", f"Pass `dt={rounded_down(event / 8):g}`, or make the bump longer.")
-    time = _instants(round(duration / dt), dt, begins)
+    time = _instants(whole((duration + beyond) / dt), dt, begins)
     return time, heights_under_wheels(vehicle, road, time)
 
 

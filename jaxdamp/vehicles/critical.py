@@ -37,7 +37,8 @@ def critical_damping(vehicle: AbstractVehicle) -> dict[str, CriticalDamping]:
     stroke, at rest, and are those at the wheel, as is the rate of the damper: with a `MotionRatio` that of the whole
     law. `modes` has the damping ratios of the coupled motions. Differentiable in every parameter.
 
-    Dampers that are not the only link between a body and a wheel (of a solid axle, a cab, a seat) are left out.
+    Dampers that are not the only link between a body and a wheel (of a solid axle, a cab, a seat) are left out; the
+    main body itself is no wheel, also where it stands on its tyres (`TrackedHull`).
 
     Arguments:
         vehicle: any vehicle; a controller is ignored.
@@ -55,7 +56,7 @@ def critical_damping(vehicle: AbstractVehicle) -> dict[str, CriticalDamping]:
     pairs = {}
     for link, end, spring in zip(frame.links, lower, springs, strict=True):
         wheels = [i for i, heights in enumerate(on_road) if end in heights]
-        if not wheels or lower.count(end) > 1:
+        if not wheels or lower.count(end) > 1 or end == f"z_{frame.main_body.name}":
             continue
         mass = frame.body(end.removeprefix("z_")).mass
         carried = sum(loads[i] for i in wheels) / STANDARD_GRAVITY - mass

@@ -4,12 +4,14 @@ from collections.abc import Sequence
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, ArrayLike, Complex, Float
 
 from jaxdamp import _checks
 from jaxdamp._limits import root
 from jaxdamp._matrices import solve
 from jaxdamp._quickly import compiled_for_loops
+from jaxdamp._traced import behind
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.linear import LinearVehicle, as_linear
@@ -126,8 +128,9 @@ def spectral_rms(
             equal. Needs wheels on both sides.
 
     Raises:
-        ValueError: frequencies that do not increase, a density or coherence of another shape, a coherence for a vehicle
-            whose wheels stand for both sides, several axles with neither `speed` nor `in_phase`.
+        ValueError: frequencies that do not increase, a density or coherence of another shape, a negative density, a
+            coherence beyond −1 … 1 or for a vehicle whose wheels stand for both sides, several axles with neither
+            `speed` nor `in_phase`.
 
     >>> import numpy as np
     >>> from jaxdamp.vehicles.presets import quarter_car_000
@@ -136,7 +139,7 @@ def spectral_rms(
     >>> round(float(rms["sprung_acceleration"]), 1)
     65.8
     """
-    _checks.finite("density", density)
+    _checks.nonnegative("density", density)
     points, levels = jnp.asarray(frequency, dtype=float), jnp.asarray(density, dtype=float)
     values = _checks.concrete(frequency)
     if values is not None and (values.ndim != 1 or values.size < 2):
@@ -152,6 +155,9 @@ def spectral_rms(
         shared = jnp.asarray(coherence, dtype=float)
         if shared.shape != points.shape:
             _checks.refuse("coherence", f"have the shape {points.shape} of `frequency`", f"of shape {shared.shape}")
+        known = behind(shared)
+        if known is not None and (wrong := ~(np.abs(known) <= 1.0 + 1e-6)).any():
+            _checks.refuse("coherence", "be between -1 and 1", _checks.summary(known, wrong))
         offsets = _checks.concrete(linear.left)
         if offsets is not None and (offsets == 0).any():
             remedy = "Take a `RollCar` or a `FullCar`, or leave it out."

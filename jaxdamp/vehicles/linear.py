@@ -167,7 +167,13 @@ def linearise(
     if amplitude is not None:
         _checks.positive("amplitude", amplitude)
         _checks.positive("frequency", frequency)
-    sinusoidal = (None if a is None else jnp.asarray(a, dtype=float) for a in (amplitude, frequency))
+    sinusoidal = [None if a is None else jnp.asarray(a, dtype=float) for a in (amplitude, frequency)]
+    shapes, ports = [jnp.shape(0.0 if a is None else a) for a in sinusoidal], vehicle.layout.ports
+    if shapes[0] not in ((), (1,), (len(ports),)):
+        must = f"be one number, or one for each of the ports {', '.join(ports)}"
+        _checks.refuse("amplitude", must, f"of shape {shapes[0]}")
+    if shapes[1]:
+        _checks.refuse("frequency", "be one number", f"of shape {shapes[1]}", "Call it once for each.")
     linear = _linearise(vehicle, *sinusoidal)
     matrix = _checks.concrete(linear.state_matrix)
     if matrix is not None and not np.all(np.isfinite(matrix)):

@@ -37,7 +37,8 @@ def stationary_rms(
 
     Channels that contain the white noise itself (the tyre load, if there is tyre damping) have an infinite RMS,
     returned as `inf`. Absolute heights (`z_…`) have no finite RMS; the returned ones are relative to the road under the
-    front axle.
+    front axle. Where a spring holds the vehicle to the ground (`Guide`), those heights, strokes and loads that a
+    lasting height of the road changes have none either: `inf`.
 
     Arguments:
         vehicle: a vehicle, or what `linearise` made of it.
@@ -152,9 +153,15 @@ def _in_motion(
 def _covariance(
     linear: LinearVehicle, delays: Float[Array, " wheels"], chosen: tuple[int, ...]
 ) -> Float[Array, "channels channels"]:
-    """∫ k kᵀ ds of some channels; infinite for a vehicle that does not come to rest."""
+    """∫ k kᵀ ds of some channels; infinite for a vehicle that does not come to rest.
+
+    The mean square of a channel that follows the height of the road, which has no end, is infinite.
+    """
     c, settled = linear.output[np.array(chosen)], linear.settled()
     # ξ = x − settled z_r obeys ξ̇ = A ξ + (E − settled) ż_r; channels are C ξ + (C settled + D) z_r + F ż_r
     static = c @ settled + linear.road_feed[np.array(chosen)]
     covariance, ends = channel_covariance(linear.state_matrix, c, linear.road_rate_input - settled, static, delays)
-    return jnp.where(ends, covariance, jnp.inf)
+    follows = jnp.sum(static, axis=1) - np.array([linear.channels[i].startswith("z_") for i in chosen], c.dtype)
+    size = jnp.sum(jnp.abs(c), axis=1) + jnp.sum(jnp.abs(linear.road_feed[np.array(chosen)]), axis=1)
+    adrift = jnp.abs(follows) > np.finfo(c.dtype).eps ** (1 / 3) * size
+    return jnp.where(ends & ~jnp.diag(adrift), covariance, jnp.inf)

@@ -81,8 +81,18 @@ class Layout:
 
 
 def layout_of(frame: Frame, measured: Sequence[Measured]) -> Layout:
-    """The layout of a vehicle of these parts, with its channels."""
+    """The layout of a vehicle of these parts, with its channels.
+
+    Raises:
+        ValueError: two channels of one name, as of a place named like a damper.
+    """
     channels = tuple(channel for channel, _ in measured)
+    by_name: dict[str, Channel] = {}
+    for channel in channels:
+        if (first := by_name.setdefault(channel.name, channel)) is not channel:
+            both = f"{channel.name!r} of two: {first.description}; {channel.description}"
+            must = "give each channel a name of its own"
+            _checks.refuse("bodies, places, links and wheels", must, both, "Rename the place or the part.")
     return Layout(
         frame.coordinates,
         frame.element_names,

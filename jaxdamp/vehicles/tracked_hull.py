@@ -154,7 +154,7 @@ class TrackedHull(AbstractVehicle):
         """Decay of free pitch without heave with these coefficients [N s/m], by half cycles and over a whole one.
 
         Each half cycle, from one turning point to the next, decays by exp(πn/√(ω² − n²)) with n of its direction; the
-        whole cycle by their product. Valid below critical damping, n < ω; other coefficients are refused.
+        whole cycle by their product. Valid below critical damping, n < ω; other and negative coefficients are refused.
 
         A hull that is free to heave decays a little differently, as its dampers, on wheels 1, 2 and 5, also lift it.
         From 0.02 rad, `simulate(hull, flat_road, start={"pitch": 0.02})` gives for `m113_003` 14.05, 15.09 and 17.14
@@ -166,6 +166,8 @@ class TrackedHull(AbstractVehicle):
         >>> [round(float(ratio), 2) for ratio in decay]
         [4.0, 4.56, 18.23]
         """
+        _checks.nonnegative("compression", compression)
+        _checks.nonnegative("rebound", rebound)
         _, front, rear = self._squares()
         frequency = self.pitch_frequency()
 

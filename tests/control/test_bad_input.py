@@ -64,6 +64,14 @@ def test_commands_that_stay_at_a_limit_are_said():
         (lambda: Ride(_delayed(2.0), ROAD, duration=1.0), "No command of the controller would be applied"),
         (lambda: Ride(_delayed(0.0), ROAD, duration=1.0)({"car.damper.levels.1": 2.0}), "levels"),
         (lambda: _command(1.5), "`Scheduled.command` must be between 0 and 1, but is 1.5"),
+        (
+            lambda: Controlled(QUARTER, "skyhook"),
+            "`policy` must be a policy, or .* but is the text 'skyhook'",
+        ),
+        (lambda: Controlled(QUARTER, None), "`policy` must be a policy, .* but is None. Such as"),
+        (lambda: Controlled(QUARTER, {}), "`policy` must hold a policy of one damper or more"),
+        (lambda: _delayed(np.inf), "`delay` must be finite and not negative, but is inf"),
+        (lambda: Controlled(QUARTER, Skyhook(), still=0.0), "`still` must be positive and finite, but is 0"),
         (lambda: Controlled(quarter(Linear(1e3)), Skyhook()), "which takes a command"),
         (lambda: Controlled(_delayed(0.0), Skyhook()), "`car` must have no controller yet, but is a Controlled"),
         (
@@ -71,7 +79,8 @@ def test_commands_that_stay_at_a_limit_are_said():
             "`period` must be a whole",
         ),
     ],
-    ids=["delay", "delay of a ride", "levels are no parameter", "command", "no command", "two controllers", "period"],
+    ids="""delay,delay of a ride,levels are no parameter,command,a word,no policy,no policies,endless delay,still,\
+no command,two controllers,period""".split(","),
 )
 def test_what_cannot_be_controlled_is_refused(make, message):
     with pytest.raises(ValueError, match=message):

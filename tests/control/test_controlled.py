@@ -271,7 +271,7 @@ def test_single_precision_drives_too(car):
             r"`policy\['damper'\]` must be a policy",
         ),
         (lambda: Controlled(quarter(), Skyhook(), period=0.0), "`period` must"),
-        (lambda: Controlled(quarter(), Skyhook(), delay=-1e-3), "`delay` must not be negative"),
+        (lambda: Controlled(quarter(), Skyhook(), delay=-1e-3), "`delay` must be finite and not negative"),
         (lambda: Controlled(quarter(), Skyhook(gain=-1.0)), "gain"),
         (lambda: simulate(_period(7.5e-4), ROAD, duration=1.0), "`period` must be a whole number of steps of 0.001 s"),
         (lambda: Ride(_period(5e-3, 5e-4), ROAD, duration=1.0), "`delay` must be a whole number of steps"),

@@ -3,11 +3,13 @@ import numpy as np
 import pytest
 
 from jaxdamp.metrics import (
+    aggregate_force,
     estimated_vibration_dose_value,
     evaluation_method,
     motion_sickness_dose,
     motion_sickness_percentage,
     shock_ratios,
+    temperature_rise,
     vibration_dose_value,
     weighted_rms,
     weighted_signal,
@@ -22,6 +24,20 @@ SINE = np.sin(2 * np.pi * 5.0 * TIME)
 def test_dose_of_a_sine():
     # (A^4 3/8 T)^(1/4) over whole cycles
     assert float(vibration_dose_value(1.3 * SINE, 0.002, None)) == pytest.approx(1.3 * (15.0) ** 0.25, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("metric", "values"),
+    [
+        (lambda x: weighting_factor(x, "Wk"), [0.5, 1]),
+        (lambda x: temperature_rise(90.0, x, 1200.0, 1.5), [60.0, 800.0]),
+        (lambda x: estimated_vibration_dose_value(x, 100.0), [0.5, 0.6]),
+        (lambda x: aggregate_force(x, [0.0, 0.0], 0.1), [[1, 2], [3, 4]]),
+        (lambda x: weighting_factor(x, "Wk"), []),
+    ],
+)
+def test_lists_are_taken_as_arrays(metric, values, unchecked):
+    np.testing.assert_array_equal(metric(values), metric(np.array(values, float)))
 
 
 def test_dose_of_a_gaussian_record(rng):

@@ -40,6 +40,8 @@ def test_a_sine_with_an_offset_is_cycles_of_its_amplitude(unchecked):
     np.testing.assert_allclose(found.mean, 100.0)
     assert np.sum(found.count) == 5.0
     assert rainflow_cycles([3.0, 3.0]).damage(4) == 0.0
+    two = rainflow_cycles([1.0, 2.0])
+    assert (two.amplitude.tolist(), two.mean.tolist(), two.count.tolist()) == ([0.5], [1.5], [0.5])
     for wrong, message in (([1.0], "hold two or more samples"), ([1.0, np.nan, 2.0], "must be finite.*Cut the gaps")):
         with pytest.raises(ValueError, match=message):
             rainflow_cycles(wrong)
@@ -121,5 +123,7 @@ def test_errors(unchecked):
         spectral_damage(FREQUENCY, g, 3, method="Dirlik")
     with pytest.raises(ValueError, match=r"`density` must be as long as `frequency`"):
         spectral_moments(FREQUENCY, g[:-1])
+    with pytest.raises(ValueError, match=r"`frequency` must increase, but is 250 to 0 Hz in another order. Sort"):
+        spectral_moments(FREQUENCY[::-1], g)
     with pytest.raises(ValueError, match=r"`orders` must not be negative, but is \(0, -1\)"):
         spectral_moments(FREQUENCY, g, (0, -1))

@@ -15,9 +15,12 @@ def test_a_metric_is_named_after_its_parts():
 
 
 def test_units_follow_from_those_of_the_channels():
-    units = {"a": "m/s^2", "f": "N", "v": "m/s"}
-    assert Metric("a", "vibration_dose_value").unit(units) == "m/s^1.75"
-    assert Metric("f", "dissipated_power", by="v").unit(units) == "W"
+    units = {"a": "m/s^2", "f": "N", "v": "m/s", "d": "m", "moment": "N m", "rate": "rad/s", "share": ""}
+    doses = {"a": "m/s^1.75", "f": "N s^0.25", "v": "m/s^0.75", "moment": "N m s^0.25", "share": "s^0.25"}
+    assert {name: Metric(name, "vibration_dose_value").unit(units) for name in doses} == doses
+    for channel, by in (("f", "v"), ("v", "f"), ("moment", "rate")):
+        assert Metric(channel, "dissipated_power", by=by).unit(units) == "W"
+    assert Metric("d", "dissipated_power").unit(units) == "m"
     assert Metric("f", "mean", by="v").unit(units) == "N m/s"
 
 

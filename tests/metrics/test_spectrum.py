@@ -83,6 +83,7 @@ def test_density_is_proportional_to_the_interval(noise):
             {"segment_length": 5004},
             r"`segment_length` must lie between 2 and the length of the signal \(5003\), but is 5004",
         ),
+        ({"segment_length": 50.0}, r"`segment_length` must be a whole number of samples, but is 50.0"),
         ({"segment_length": 1}, r"`segment_length` must lie between 2 and .*but is 1. Shorten the segments"),
         ({"overlap": 50}, r"`overlap` must be at least 0 and below 1, but is 50.*write 0.5 for 50 %"),
         ({"overlap": -0.1}, r"`overlap` must be at least 0 and below 1, but is -0.1"),
@@ -92,7 +93,7 @@ def test_density_is_proportional_to_the_interval(noise):
         ),
     ],
 )
-def test_errors(noise, options, message):
+def test_errors(noise, options, message, unchecked):
     with pytest.raises(ValueError, match=message):
         power_spectral_density(noise, **{"dt": 0.002, **options})
 

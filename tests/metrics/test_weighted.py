@@ -91,6 +91,17 @@ def test_interval_may_be_traced_in_steps_only():
         jax.jit(lambda x, dt: weighted_rms(x, dt, "Wk"))(signal, DT)
 
 
+def test_a_record_that_is_weighted_already_is_taken_as_it_is():
+    assert float(weighted_rms(2.0 + np.zeros(9), 0.01, None)) == 2.0
+    with pytest.raises(ValueError, match=r"`dt` must be positive"):
+        weighted_rms(np.ones(9), 0.0, None)
+
+
+def test_no_weighting_is_refused_by_the_filter(unchecked):
+    with pytest.raises(ValueError, match=r"`weighting` must be one of 'Wb'.*but is None"):
+        weighted_signal(np.ones(9), 0.01, None)  # pyright: ignore[reportArgumentType]
+
+
 def test_integers_count_as_numbers(unchecked):
     record = np.arange(-50, 50) % 7
     assert float(weighted_rms(record, 0.01, "Wk")) == pytest.approx(float(weighted_rms(record * 1.0, 0.01, "Wk")))

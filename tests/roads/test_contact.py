@@ -28,6 +28,15 @@ def test_patch_of_a_record_is_the_mean_and_level_beyond_its_ends():
         contact_patch(record, length=0.6, speed=10.0).height(np.array([0.0, 1.2]))
 
 
+@pytest.mark.parametrize("points", [9, 25])
+def test_patch_over_a_steep_flank_errs_by_no_more_than_the_docstring_says(points):
+    kerb = contact_patch(step(0.08, start=1.0, ramp=1e-6), length=0.15, speed=10.0, points=points)
+    time = np.linspace(0.992, 1.008, 8001)
+    exact = 0.08 * np.clip((time - 0.9925) / 0.015, 0.0, 1.0)
+    error = np.max(np.abs(np.asarray(kerb.height(time)[:, 0]) - exact)) / 0.08
+    assert 0.9 * np.pi / (4 * points) < error < np.pi / (4 * points)
+
+
 def kerb_of_a_disc(x, height, radius):
     """The lowest point of a disc at x [m] before (negative) or behind a kerb: the arc about its edge."""
     arc = height - radius + np.sqrt(np.maximum(radius**2 - x**2, 0.0))

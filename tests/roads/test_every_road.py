@@ -142,6 +142,22 @@ def test_the_speed_is_that_of_the_roads_that_have_one():
     assert float(traced(17.0)) == 17.0
 
 
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda speed: roads.iso8608("C", speed, seed=1),
+        lambda speed: roads.iso8608_filtered("C", speed, seed=1, length=100.0),
+        lambda speed: roads.white("C", speed),
+        lambda speed: roads.from_profile(np.arange(3.0), np.arange(3.0), speed),
+        lambda speed: roads.cosine_bump(0.1, length=1.0, speed=speed),
+        lambda speed: roads.contact_patch(EVENT, length=0.1, speed=speed),
+    ],
+)
+def test_a_speed_is_one_number(make, unchecked):
+    with pytest.raises(ValueError, match=r"`speed` must be one number, but is of shape \(2,\).*`jax.vmap` for many"):
+        make(np.array([10.0, 20.0]))
+
+
 def test_columns_of_different_wheels_do_not_go_together():
     two, moved = roads.two_track(SURFACE, SURFACE), roads.from_profile(np.arange(100) * 0.01, np.zeros((100, 2)))
     with pytest.raises(ValueError, match=r"`roads` must have columns alike: two tracks .*, but is 2 columns over time"):

@@ -141,7 +141,10 @@ BAD = np.where(np.arange(400) >= 17, np.nan, 0.0)
         ),
         (POSITION**1.1, POSITION, {}, r"`position` must increase in equal steps, but is stepped by 0.037.*Resample"),
         (POSITION, POSITION[:-1], {}, r"`height` must hold one value per position \(400\), but is of shape \(399,\)"),
-        (POSITION[:1], POSITION[:1], {}, r"`position` must hold at least two samples, but is of length 1"),
+        (POSITION, 1.0, {}, r"`height` must hold one value per position \(400\), but is of shape \(\)"),
+        (POSITION, np.zeros((400, 2, 2)), {}, r"`height` must hold one value per.*\(400, 2, 2\).*\[samples, wheels\]"),
+        (POSITION[:1], POSITION[:1], {}, r"`position` must hold at least two samples in a row, but is of shape \(1,\)"),
+        (POSITION.reshape(200, 2), POSITION, {}, r"`position` must .* in a row, but is of shape \(200, 2\)"),
         (
             POSITION,
             POSITION,

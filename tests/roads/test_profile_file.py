@@ -70,6 +70,21 @@ def test_without_a_speed_positions_are_times(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("head", "speed", "message"),
+    [
+        ("t_s,h_mm", 5.0, r"a unit of length in the header of its positions.*'t_s'.*in time are without it"),
+        ("t_ms,h_m", 5.0, r"a unit of length in the header of its positions.*'t_ms'"),
+        ("x_m,h_m", None, r"a unit of time in the header of its positions.*'x_m'.*along the road need `speed`"),
+        ("x,h_s", 5.0, r"a unit of length in the header of its heights.*'h_s'"),
+    ],
+)
+def test_units_of_the_wrong_quantity_behind_an_underscore_are_refused(tmp_path, head, speed, message):
+    (tmp_path / "road.csv").write_text(text(head=head + "\n"))
+    with pytest.raises(ValueError, match=message):
+        read_profile(tmp_path / "road.csv", speed)
+
+
+@pytest.mark.parametrize(
     ("content", "options", "message"),
     [
         ("# nothing\n", {}, r"`path` must name a file with numbers.*empty"),

@@ -1,7 +1,8 @@
+import jax
 import numpy as np
 import pytest
 
-from jaxdamp.roads import cosine_bump, from_profile, iso8608, sine, superposed, two_track
+from jaxdamp.roads import cosine_bump, from_profile, iso8608, joined, sine, superposed, two_track
 
 
 def test_heights_add_and_the_shortest_road_ends_it():
@@ -12,6 +13,18 @@ def test_heights_add_and_the_shortest_road_ends_it():
     np.testing.assert_allclose(road.height(time), sum(part.height(time) for part in road.roads), atol=1e-16)
     assert road.duration == pytest.approx(0.99) and road.grid == pytest.approx(0.01)
     assert [float(t) for t in road.span] == pytest.approx([0.0, 0.99])
+
+
+def test_a_closed_lap_repeats_until_the_longer_record_ends():
+    lap = from_profile(0.1 * np.arange(50), 0.01 * np.sin(np.arange(50.0)), periodic=True)
+    record = from_profile(0.1 * np.arange(201), np.zeros(201))
+    road = superposed(lap, record)
+    assert road.duration == road.span[1] == superposed(road, lap).duration == two_track(lap, record).duration == 20.0
+    assert joined(road, sine(0.01, frequency=1.0)).at == 20.0
+    assert jax.jit(lambda: superposed(road, lap).duration)() == 20.0
+    assert superposed(lap, lap).duration == 5.0
+    # a random road may not repeat, and ends it before
+    assert superposed(lap, record, iso8608("C", 10.0, seed=1, length=100.0)).duration == 10.0
 
 
 def test_tracks_must_be_equal():

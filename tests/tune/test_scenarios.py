@@ -93,7 +93,7 @@ def test_a_limit_in_scenarios_is_judged_in_each_of_them_on_fresh_roads() -> None
     ranges = limit_ranges({ACCELERATION: 0.5 * float(each[0] + each[1])}, [ACCELERATION])
     allowed = in_each(ranges, ["road 1, light", "road 1, as it is"])
     units = {m.name: "" for m in metrics}
-    fresh = rescoring.rescored(drive, [scenarios] * 3, units, TYRE, allowed)
+    fresh = rescoring.rescored(drive, [scenarios] * 3, units, TYRE, (), allowed)
     np.testing.assert_allclose([fresh.after[name] for name in allowed], np.tile(each, (3, 1)).T, rtol=1e-12)
     assert list(lost_limits(fresh, allowed)) == [f"{ACCELERATION} in 'road 1, light'"]
     assert set(fresh.content()["metrics"]) == set(units)

@@ -1,5 +1,7 @@
 """Critical damping: against the damping ratio of a mass alone, and loads by hand."""
 
+import dataclasses
+
 import equinox as eqx
 import jax
 import numpy as np
@@ -7,7 +9,7 @@ import pytest
 
 from jaxdamp import dampers
 from jaxdamp.parameters import replace
-from jaxdamp.vehicles import QuarterCar, critical_damping, modes
+from jaxdamp.vehicles import QuarterCar, Seat, SeatMass, critical_damping, modes
 from jaxdamp.vehicles.presets import full_car_jazar, half_car_002, m113_003, truck_001
 
 
@@ -37,7 +39,9 @@ def test_each_wheel_carries_its_share():
         f"{end}_{side}_damper" for end in ("front", "rear") for side in ("left", "right")
     }
     assert set(critical_damping(truck_001())) == {"front_damper", "tandem_damper"}
-    assert critical_damping(m113_003()) == {}  # its wheels have no mass
+    hull, seat = m113_003(), Seat((SeatMass(80.0, 30e3, LAW),), ahead=0.5)
+    for seats in ((), (seat,)):  # its wheels have no mass, and it is none itself
+        assert critical_damping(dataclasses.replace(hull, seats=seats)) == {}
 
 
 def test_it_is_differentiable():

@@ -174,11 +174,21 @@ def test_friction_with_memory_at_rest_has_no_stationary_response_but_one_in_moti
     [
         (lambda car: linearise(car, amplitude=0.01), r"`frequency` must be given with the other"),
         (lambda car: linearise(car, amplitude=-0.01, frequency=1.0), r"`amplitude` must be positive"),
+        (
+            lambda car: linearise(car, amplitude=[0.01, 0.02, 0.03], frequency=1.0),
+            r"`amplitude` must be one number, or one for each of the ports damper, but is of shape \(3,\)",
+        ),
+        (lambda car: linearise(car, amplitude=0.01, frequency=[1.0, 2.0]), r"`frequency` must be one number"),
         (lambda car: frequency_response(car, np.array([[1.0]])), r"`frequency` must have one axis"),
         (lambda car: frequency_response(car, [1.0], speed=0.0), r"`speed` must be positive"),
         (lambda car: frequency_response(car, [1.0], speed=1.0, by_wheel=True), r"`speed` must be left out"),
         (lambda car: spectral_rms(car, [2.0, 1.0], [1.0, 1.0]), r"`frequency` must increase"),
         (lambda car: spectral_rms(car, [1.0, 2.0], [1.0]), r"`density` must have the shape"),
+        (lambda car: spectral_rms(car, [1.0, 2.0], [-1.0, 1.0]), r"`density` must be finite and not negative"),
+        (
+            lambda _: spectral_rms(full_car_jazar(), [1.0, 2.0], [1.0, 1.0], in_phase=True, coherence=[1.0, -2.0]),
+            r"`coherence` must be between -1 and 1, but is \[ 1. -2.\]",
+        ),
         (
             lambda car: spectral_rms(car, [1.0, 2.0], [1.0, 1.0], coherence=[1.0, 1.0]),
             r"`coherence` must be left out where a wheel stands for both sides",

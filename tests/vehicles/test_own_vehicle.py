@@ -1,5 +1,7 @@
 """Vehicles put together from parts."""
 
+import dataclasses
+
 import jax
 import numpy as np
 import pytest
@@ -131,6 +133,10 @@ def test_gradients_of_ridden_metrics_agree_with_differences():
         assert float(forward[i]) == pytest.approx(float((4 * near - far) / 3), rel=1e-6)
 
 
+def replace_places(car, *places):
+    return dataclasses.replace(car, places=places)
+
+
 @pytest.mark.parametrize(
     ("build", "message"),
     [
@@ -140,6 +146,12 @@ def test_gradients_of_ridden_metrics_agree_with_differences():
             r"`links and wheels with elements` must have names that differ",
         ),
         (lambda: Frame((BODY, WHEEL), (LINK,), (TYRE,), (Place("sprung"),)), r"`bodies and places` must have names"),
+        (
+            lambda: LumpedVehicle(Frame((BODY, WHEEL), (LINK,), (TYRE,), (Place("damper"),))).layout,
+            r"must give each channel a name of its own, but is 'damper_velocity' of two: rate of the .* Rename",
+        ),
+        (lambda: replace_places(half_car_002(), Place("front_body", 1.0)).system(), r"'front_body_velocity' of two"),
+        (lambda: replace_places(half_car_002(), Place("pitch", 1.0)).layout, r"'pitch_acceleration' of two"),
         (lambda: Frame((BODY,), (LINK,), (TYRE,)), r"`point` must be one of 'z_sprung'.*Did you mean"),
         (lambda: Frame((BODY, WHEEL), (LINK,), ()), r"`wheels` must hold one or more"),
         (lambda: Frame((BODY,), (), (Wheel("", Point({"pitch": 1.0}), 1e5),)), r"`point` must be one of 'z_sprung'"),

@@ -107,3 +107,5 @@ def test_formulas_outside_their_validity_are_refused():
         hull.required_damping(0.5)
     with pytest.raises(ValueError, match=r"must be below critical damping, but is \d.* times it"):
         hull.pitch_decay(1e5, 1e5)
+    with pytest.raises(ValueError, match=r"`compression` must be finite and not negative, but is -1000"):
+        hull.pitch_decay(-1e3, 1e3)
