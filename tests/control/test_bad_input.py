@@ -65,10 +65,10 @@ def test_commands_that_stay_at_a_limit_are_said():
         (lambda: Ride(_delayed(0.0), ROAD, duration=1.0)({"car.damper.levels.1": 2.0}), "levels"),
         (lambda: _command(1.5), "`Scheduled.command` must be between 0 and 1, but is 1.5"),
         (
-            lambda: Controlled(QUARTER, "skyhook"),
+            lambda: Controlled(QUARTER, "skyhook"),  # type: ignore[arg-type]
             "`policy` must be a policy, or .* but is the text 'skyhook'",
         ),
-        (lambda: Controlled(QUARTER, None), "`policy` must be a policy, .* but is None. Such as"),
+        (lambda: Controlled(QUARTER, None), "`policy` must be a policy, .* but is None. Such as"),  # type: ignore[arg-type]
         (lambda: Controlled(QUARTER, {}), "`policy` must hold a policy of one damper or more"),
         (lambda: _delayed(np.inf), "`delay` must be finite and not negative, but is inf"),
         (lambda: Controlled(QUARTER, Skyhook(), still=0.0), "`still` must be positive and finite, but is 0"),

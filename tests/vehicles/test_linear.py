@@ -178,7 +178,7 @@ def test_friction_with_memory_at_rest_has_no_stationary_response_but_one_in_moti
             lambda car: linearise(car, amplitude=[0.01, 0.02, 0.03], frequency=1.0),
             r"`amplitude` must be one number, or one for each of the ports damper, but is of shape \(3,\)",
         ),
-        (lambda car: linearise(car, amplitude=0.01, frequency=[1.0, 2.0]), r"`frequency` must be one number"),
+        (lambda car: linearise(car, amplitude=0.01, frequency=jnp.ones(2)), r"`frequency` must be one number"),
         (lambda car: frequency_response(car, np.array([[1.0]])), r"`frequency` must have one axis"),
         (lambda car: frequency_response(car, [1.0], speed=0.0), r"`speed` must be positive"),
         (lambda car: frequency_response(car, [1.0], speed=1.0, by_wheel=True), r"`speed` must be left out"),
