@@ -213,10 +213,10 @@ def read_table(
     if side is not None:
         _checks.one_of("side", side, SIDES)
     given = {"sign": sign, "columns": columns, "units": files["units"], "delimiter": files["delimiter"]}
-    _, given, notes = with_manifest(paths, manifest, given, TABLE_KEYS)
+    asked, given, notes = with_manifest(paths, manifest, given, TABLE_KEYS)
     signs.check_words(given["sign"], None)
     choice = Choice({**(given["columns"] or {})}, {**(given["units"] or {})})
-    sheets, readers = find_files(paths, {*FOLDER_SUFFIXES, *(files["readers"] or {})}), with_own(files["readers"])
+    sheets, readers = find_files(asked, {*FOLDER_SUFFIXES, *(files["readers"] or {})}), with_own(files["readers"])
     notes, sides, problems, how, stated = [*notes], [], Problems(), How(choice, given["sign"], side), set()
     for file in sheets:
         with problems.collected():
@@ -258,9 +258,9 @@ def are_tables(
         manifest: as in `read_table`.
     """
     given = {"columns": columns, "units": units, "delimiter": delimiter}
-    _, given, _ = with_manifest(paths, manifest, given, BENCH_KEYS)
+    asked, given, _ = with_manifest(paths, manifest, given, BENCH_KEYS)
     choice = Choice({**(given["columns"] or {})}, {**(given["units"] or {})})
-    files = find_files(paths, FOLDER_SUFFIXES)
+    files = find_files(asked, FOLDER_SUFFIXES)
     if any(file.stat().st_size > _LARGEST for file in files):
         return False
     try:
