@@ -29,7 +29,7 @@ def _road_rates(response: "Response") -> tuple[Array, Callable[[Array], Array], 
     Over a step of the run the road is straight: its slope there, and the mean of the forces. Over several steps between
     saved instants it is not: its rate at these.
     """
-    if response._every > 1:
+    if response.every > 1:
         return response.road_rate, _same, _middle
     return jnp.diff(response.road, axis=0) / jnp.diff(response.time)[:, None], _middle, _same
 

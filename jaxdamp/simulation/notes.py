@@ -120,6 +120,13 @@ def range_sentences(uses: Mapping[str, Sequence[RangeUse]]) -> tuple[str, ...]:
     return tuple(text for text in texts if text)
 
 
+def without_motion(motion: Float[np.ndarray, "time n"], road: Float[np.ndarray, "time wheels"]) -> tuple[str, ...]:
+    """A sentence on a run in which nothing moves, as where it ends before the bump of its road."""
+    if np.any(road != road[0]) or np.any(motion != motion[0]):
+        return ()
+    return ("Nothing moves, as the road stays level. If it has a bump later, pass a longer `duration`.",)
+
+
 LEAST = 1e-3  # of the static load, by which a load must be below zero
 
 

@@ -28,6 +28,7 @@ from jaxdamp.simulation.notes import (
     range_sentences,
     range_uses,
     tyres_in_tension,
+    without_motion,
 )
 from jaxdamp.simulation.ride_metrics import Comfort, comfort, comfort_table, comfort_units, metrics_table, ride_metrics
 from jaxdamp.simulation.wheels import AxleTiming
@@ -91,6 +92,7 @@ class Response(eqx.Module, AbstractResult):
         whole: the run that this response is a part of; None for a run.
         begin: number of the first instant of this part in the run.
         commands: of the dampers, then the demanded forces [N], shape (time, commands); None without a controller.
+        every: of how many instants of the run one is saved.
     """
 
     vehicle: AbstractVehicle
@@ -105,7 +107,7 @@ class Response(eqx.Module, AbstractResult):
     whole: "Response | None" = None
     begin: Int[Array, ""] | None = None
     commands: Float[Array, "time commands"] | None = None
-    _every: int = eqx.field(static=True, repr=False, default=1)  # of how many instants of the run one is saved
+    every: int = eqx.field(static=True, repr=False, default=1)
     histogram = Elsewhere("`jaxdamp.metrics.velocity_histogram(response['damper_velocity'], edges)`")
     _computed: _Remembered = eqx.field(init=False, repr=False, default_factory=_Remembered)
 
@@ -130,7 +132,7 @@ class Response(eqx.Module, AbstractResult):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Tyres that pulled on the road, dampers beyond the fitted range of their laws, commands at their limits.
+        """Tyres that pulled, dampers beyond the fitted range of their laws, commands at their limits, or no motion.
 
         Empty while JAX traces.
         """
@@ -140,7 +142,8 @@ class Response(eqx.Module, AbstractResult):
         limits = ()
         if self.commands is not None:
             limits = commands_at_limits(self.system, np.asarray(self.time), np.asarray(self.commands))
-        return (*tyres, *range_sentences(self.range_use()), *limits)
+        still = without_motion(np.asarray(self.motion), np.asarray(self.road))
+        return (*still, *tyres, *range_sentences(self.range_use()), *limits)
 
     warnings = notes
 

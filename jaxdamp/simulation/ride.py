@@ -20,6 +20,7 @@ from jaxdamp._quickly import compiled_quickly
 from jaxdamp._traced import is_batched, look_behind
 from jaxdamp._types import Point, Scalar
 from jaxdamp._vectors import MemoryLayout
+from jaxdamp._warned import warn
 from jaxdamp.codegen import compiler
 from jaxdamp.configuration import one_at_a_time, target
 from jaxdamp.dampers import RangeUse, has_fitted_range
@@ -31,7 +32,7 @@ from jaxdamp.simulation.equations import Equations, settled
 from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.notes import range_uses
 from jaxdamp.simulation.observer import MetricObserver, recorded
-from jaxdamp.simulation.run import refuse_stacked, run_check, sampled, warn_of_missed_event
+from jaxdamp.simulation.run import refuse_stacked, run_check, sampled
 from jaxdamp.simulation.stationary import (
     refuse_without_stationary_motion,
     stationary_dampers,
@@ -124,9 +125,11 @@ class Ride(eqx.Module):
             return
         engine, self.dt = chosen_engine(engine, Exponential(substeps=substeps), dt, substeps)
         _, self.heights = sampled(vehicle, road, duration, self.dt)
-        length = (self.heights.shape[0] - 1) * self.dt
+        length, known = (self.heights.shape[0] - 1) * self.dt, _checks.concrete(self.heights)
         check_control(engine, vehicle.system(), self.dt, length)
-        warn_of_missed_event(road, self.heights, length)
+        if road.shortest_event is not None and known is not None and np.all(known == known[0]):
+            text = f"The road stays level for the whole run of {length:g} s: its bump comes later."
+            warn(f"{text} Pass a longer `duration`, or an earlier `start` of the bump.")
         self.road = road if delays_by_itself(vehicle, road) else None
         self.engine = engine.prepared(run_check(vehicle, vehicle.system(), road, self.heights, self.dt))
         self.layout = self.engine.layout(2 * len(vehicle.coordinates), side_by_side=False)

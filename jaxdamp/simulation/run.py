@@ -15,7 +15,6 @@ from jaxdamp._field_types import check_field_types, check_module
 from jaxdamp._settings import with_defaults
 from jaxdamp._traced import at_compile_time, behind, is_traced
 from jaxdamp._types import Scalar, ScalarLike, Signal
-from jaxdamp._warned import warn
 from jaxdamp.dampers import coverage, warn_outside
 from jaxdamp.parameters import modules_inside
 from jaxdamp.roads import AbstractRoad
@@ -104,8 +103,6 @@ def simulate(
     _strides(time.size - 1, every, dt)
     begin = None if start is None else _displaced(vehicle, heights[0], start)
     engine = engine.prepared(run_check(vehicle, system, road, heights, dt, begin, begins))
-    if start is None and not any(goes_on):
-        warn_of_missed_event(road, heights, (time.size - 1) * dt)
     edges = _edges(vehicle, road, time, heights, goes_on)
     with engine.naming_derivatives():
         step = jnp.asarray(dt, dtype=float)
@@ -118,7 +115,7 @@ def simulate(
         remedy = " ".join([*filter(None, map(coverage, system.laws)), engine.remedy(status, dt)])
         _checks.refuse("vehicle", "have a finite response", f"at {last} (position, rate) at the end", remedy)
     timing = axle_timing(vehicle, road)
-    response = Response(vehicle, system, time[::every], *saved[:5], timing, commands=saved.commands, _every=every)
+    response = Response(vehicle, system, time[::every], *saved[:5], timing, commands=saved.commands, every=every)
     warn_outside(range_sentences(response.range_use()))
     if not return_state:
         return response
@@ -170,14 +167,6 @@ def _edges(
     before = at(2.0 * time[0] - time[1], 2.0 * heights[0] - heights[1]) if goes_on[0] else None
     after = at(2.0 * time[-1] - time[-2], 2.0 * heights[-1] - heights[-2]) if goes_on[1] else None
     return RoadEdges(before, after)
-
-
-def warn_of_missed_event(road: AbstractRoad, heights: Float[Array, "time wheels"], duration: float) -> None:
-    """Say that a run from rest ends before the bump of its road, as all results are zero."""
-    known = _checks.concrete(heights)
-    if road.shortest_event is not None and known is not None and not np.any(known - known[0]):
-        text = f"The road stays level for the whole run of {duration:g} s: its bump comes later."
-        warn(f"{text} Pass a longer `duration`, or an earlier `start` of the bump.", UserWarning)
 
 
 def _strides(count: int, every: int, dt: float) -> None:

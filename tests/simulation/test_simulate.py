@@ -276,11 +276,11 @@ def test_refuses_runs_that_make_no_sense(change, message):
 
 def test_a_run_that_ends_before_its_bump_says_so():
     late = roads.superposed(roads.cosine_bump(0.06, start=1.0, duration=0.25), roads.step(0.05, start=1.2))
-    for drive in (simulate, Ride):
-        with pytest.warns(UserWarning, match="level for the whole run of 0.8 s: its bump comes later"):
-            drive(quarter_car_000(), late, duration=0.8)
-    _, state = simulate(quarter_car_000(), late, duration=0.8, return_state=True)  # the bump is in the next part
-    simulate(quarter_car_000(), late, duration=0.8, state=state)
+    with pytest.warns(UserWarning, match="level for the whole run of 0.8 s: its bump comes later"):
+        Ride(quarter_car_000(), late, duration=0.8)
+    first, state = simulate(quarter_car_000(), late, duration=0.8, return_state=True)
+    assert first.notes == ("Nothing moves, as the road stays level. If it has a bump later, pass a longer `duration`.",)
+    assert not simulate(quarter_car_000(), late, duration=0.8, state=state).notes
 
 
 def test_comfort_of_less_than_a_second_has_no_largest_second():
