@@ -14,6 +14,7 @@ import pytest
 from jaxdamp.cli import application, offers, options, signatures
 from jaxdamp.cli.application import COMMANDS
 from jaxdamp.cli.options import Call
+from jaxdamp.cli.wording import CALLS
 from jaxdamp.dampers import Bilinear
 from jaxdamp.export import to_json
 
@@ -184,3 +185,20 @@ def test_names_of_before_and_names_of_python_still_work(tmp_path: Path, monkeypa
     assert "must start between 3000 and 4000" in refused(tmp_path, *call)
     assert "Option --limit must read like" in refused(tmp_path, *call[:3], "--limits", "travel")
     assert all(alias not in jaxdamp("tune", "--help").output for alias in ("--bounds", "--limits", "--force"))
+
+
+COMPOSED = (", or fit a law with settings", "add ", "with `jaxdamp")  # of parts that only a run joins
+
+
+def test_what_the_command_line_says_otherwise_is_still_said_by_the_library():
+    package = Path(application.__file__).parents[1]
+    trees = (ast.parse(p.read_text(encoding="utf-8")) for p in package.rglob("*.py") if p.name != "wording.py")
+    nodes = [node for tree in trees for node in ast.walk(tree)]
+    plain = [node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)]
+    filled = [
+        "".join(str(part.value) if isinstance(part, ast.Constant) else "X" for part in node.values)
+        for node in nodes
+        if isinstance(node, ast.JoinedStr)
+    ]
+    said = "\n".join(plain + filled)
+    assert not [call for call in CALLS if not call.startswith(COMPOSED) and not re.search(call, said)]
