@@ -16,9 +16,14 @@ STEPS, DT = 500, 1e-3
 
 
 def table(response):
-    """All ride metrics but counts, which have no slope, and comfort, by name."""
+    """All ride metrics but counts, which have no slope, and comfort but MTVV, which needs a second, by name."""
     names = [m.name for m in response.vehicle.ride_metrics if m.statistic.differentiable]
-    comfort = {f"{name}/{k}": v for name, felt in response.comfort().items() for k, v in felt._asdict().items()}
+    comfort = {
+        f"{name}/{k}": v
+        for name, felt in response.comfort().items()
+        for k, v in felt._asdict().items()
+        if k != "max_transient_value"
+    }
     return response.metrics(names) | comfort
 
 
