@@ -1,8 +1,8 @@
 """A law as one page for the browser: sliders, loops, records and a quarter car, computed by printed functions."""
 
-import base64
 import importlib.metadata
 import json
+import math
 import os
 import re
 from collections.abc import Iterable, Sequence
@@ -20,12 +20,13 @@ from jaxdamp._words import class_words, first_upper, in_words, metric_words
 from jaxdamp._writing import write_whole
 from jaxdamp.bench import BenchRun
 from jaxdamp.codegen import Atom, JavaScript, PrintedFunction, Program, lower, symbols
-from jaxdamp.dampers import AbstractDamper, law_name, takes_command
+from jaxdamp.dampers import AbstractDamper, law_name
+from jaxdamp.export._explorer_record import of_record, packed
 from jaxdamp.export._law_program import LawNumber, LawProgram
 from jaxdamp.export._ride_program import RideProgram
 from jaxdamp.export.module_file import to_json
 from jaxdamp.metrics import Metric
-from jaxdamp.parameters import matching, parameters, weight
+from jaxdamp.parameters import weight
 from jaxdamp.roads import AbstractRoad, cosine_bump, iso8608
 from jaxdamp.simulation import Ride, axle_timing
 from jaxdamp.vehicles import UNKNOWN_SPEED, AbstractVehicle, Point, drawing_script, matrix, presets
@@ -90,7 +91,6 @@ _SCRIPTS = ("model.js", "chart.js", "records.js", "controls.js", "page.js")
 _STEP = 1e-3  # s, as of a Ride
 _SEEDS = 3  # realisations of a random road, to be chosen from in the page
 _FASTEST = 60.0  # m/s, up to which a random road does not repeat within the run
-_SAMPLES, _PER_CYCLE = 8000, 250  # of a record in the page; the law is driven by these samples
 _FACTOR = 3.0  # of the ranges of sliders, as in a tuning
 _MAIN = re.compile(
     r"weighted_rms_|rms_.*acceleration|vibration_dose_value|working_space_rms|working_space_peak_to_peak|"
@@ -147,7 +147,7 @@ def to_explorer(
     check_module("vehicle", vehicle, (AbstractVehicle,), "to_explorer(law, path, vehicle=QuarterCar(..., damper=law))")
     _checks.positive("speed", speed)
     profile = road if isinstance(road, AbstractRoad) else None
-    duration = (profile and profile.duration) or 10.0 if duration is None else duration
+    duration = _lasting(profile) if duration is None else duration
     road_class = "C" if profile else str(road)
     profile = profile or iso8608(road_class, speed, duration, seed=seed)
     count = round(duration / _STEP) + 1
@@ -174,12 +174,17 @@ def to_explorer(
         "count": count,
         "substeps": substeps,
         "road": _of_roads(speed, duration, seed, road_class) | _of_profile(road, ride),
-        "records": [_of_record(run, (law, law if baseline is None else baseline)) for run in records],
+        "records": [of_record(run, (law, law if baseline is None else baseline)) for run in records],
     }
     programs = "".join(closed(name, texts) for name, texts in functions.items())
     programs += closed("ROAD", {"bump": bump_function()})
     programs += "const BASELINE = LAW;\n" if baseline is None else ""
     return write_whole(file, _assembled(data | {"shown": _shown(data)}, programs))
+
+
+def _lasting(profile: AbstractRoad | None) -> float:
+    """The whole steps that a road lasts [s]; 10 s where it does not end."""
+    return math.floor(((profile and profile.duration) or 10.0) / _STEP * (1.0 + 1e-9)) * _STEP
 
 
 def _of_profile(road: AbstractRoad | str, ride: Ride) -> Contents:
@@ -190,7 +195,7 @@ def _of_profile(road: AbstractRoad | str, ride: Ride) -> Contents:
     timing = axle_timing(ride.vehicle, road)
     driven = timing.kind in ("one axle", "delayed")
     speed = {"known": road.speed is not None, "speed": UNKNOWN_SPEED if road.speed is None else float(road.speed)}
-    heights = [_packed(column) for column in np.asarray(ride.heights).T]
+    heights = [packed(column) for column in np.asarray(ride.heights).T]
     return {"profile": {"title": f"given road ({class_words(road)})", "heights": heights, "driven": driven, **speed}}
 
 
@@ -320,34 +325,6 @@ def _of_roads(speed: float, duration: float, seed: int, road_class: str) -> Cont
         "length": made[0].length,
         "ramp": made[0].ramp,
         "seed": seed,
-        "drawn": [{"amplitude": _packed(road.amplitude), "phase": _packed(road.phase)} for road in made],
+        "drawn": [{"amplitude": packed(road.amplitude), "phase": packed(road.phase)} for road in made],
     }
     return {"class": road_class, "speed": speed, "iso": lines, "profile": None}
-
-
-def _of_record(run: BenchRun, laws: Sequence[AbstractDamper]) -> Contents:
-    """A record for the page: every sample, or so few of them as it takes to drive the laws, from the beginning."""
-    per_cycle = run.sampling_rate / max(run.frequency, 1.0 / run.duration)
-    stride = max(1, min(int(per_cycle / _PER_CYCLE), -(-len(run) // _SAMPLES)))
-    chosen = slice(0, _SAMPLES * stride, stride)
-    shown = {"x": run.stroke[chosen], "v": run.velocity[chosen], "force": run.force[chosen]}
-    every = "every sample" if stride == 1 else f"one sample in {stride}"
-    note = f"{every} of {len(run)}" + ("" if len(run) <= _SAMPLES * stride else f", up to the {_SAMPLES * stride}th")
-    about = {"name": run.name, "dt": stride / run.sampling_rate, "command": run.command, "note": note}
-    about |= {"beyond": " and ".join(dict.fromkeys(name for law in laws for name in _beyond(run, law)))}
-    return about | {key: _packed(values) for key, values in shown.items()}
-
-
-def _beyond(run: BenchRun, law: AbstractDamper) -> list[str]:
-    """What a record states for a law that the page does not follow, in words."""
-    names = [f"the {in_words(name)}" for name in run.settings if matching([p.path for p in parameters(law)], name)]
-    if run.command_channel is not None and takes_command(law):
-        names.append("the varying command")
-    if law.traits().temperature_dependent and (run.temperature is not None or "temperature" in run.settings):
-        names.append("the temperature")
-    return names
-
-
-def _packed(values: object) -> str:
-    """Numbers in 64 bits as text of 64 characters."""
-    return base64.b64encode(np.asarray(values, "<f8").tobytes()).decode("ascii")

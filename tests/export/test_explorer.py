@@ -1,6 +1,5 @@
 """The page of a law: written for every law, and driven in a browser, where its numbers are those of the library."""
 
-import dataclasses
 import itertools
 import json
 import re
@@ -16,7 +15,6 @@ from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import (
     AbstractMemoryless,
     Besinger,
-    BoucWen,
     CoulombFriction,
     GasSpring,
     Lag,
@@ -26,7 +24,6 @@ from jaxdamp.dampers import (
     with_command,
 )
 from jaxdamp.export import from_json, to_explorer, to_json
-from jaxdamp.identify import fit_percent
 from jaxdamp.metrics import power_spectral_density
 from jaxdamp.parameters import parameter, replace
 from jaxdamp.roads import cosine_bump, from_profile, iso8608
@@ -46,7 +43,7 @@ def browser():
         yield browser
 
 
-def page(law, folder, browser=None, *, duration=DURATION, **options):
+def page(law, folder, browser=None, *, duration: float | None = DURATION, **options):
     file = to_explorer(law, folder / "law.html", duration=duration, **options)
     if browser is not None:
         browser.open(file)
@@ -167,34 +164,6 @@ def test_roads_spectra_and_channels(tmp_path, browser):
     assert not browser.troubles()
 
 
-@pytest.mark.slow
-def test_loops_records_and_their_fit(tmp_path, browser):
-    law = 0.9 * Lag(BoucWen(800.0, 2000.0, 300.0, 1e-3, 0.75, 1.5), 0.003)
-    measured = record(Linear(1500.0))
-    page(law, tmp_path, browser, records=[measured], baseline=VALVE)
-    force = np.asarray(respond(law, measured.time, measured.stroke, measured.velocity))
-    fits = browser.evaluate("[state.fits.law, state.fits.baseline]")
-    first = browser.evaluate("firstCounted(records[0], DATA.law.states)")  # a cycle of 2 Hz
-    assert first in (500, 501)
-    assert fits[0]["fit"] == pytest.approx(fit_percent([measured.force[first:]], [force[first:]]), CLOSE)
-    other = np.asarray(respond(VALVE, measured.time, measured.stroke, measured.velocity))
-    assert fits[1]["rmse"] == pytest.approx(np.sqrt(np.mean((other - measured.force) ** 2)), CLOSE)
-    assert "every sample of 1500" in browser.evaluate("document.getElementById('fitNote').textContent")
-    browser.choose("#motion", "sines")
-    browser.type("#frequencies", "2, 8")
-    motion, shown = browser.evaluate(
-        "(() => { const m = sine(0.025, 8, DATA.law.states); return [[m.dt, [...m.x], [...m.v], m.first],"
-        " [...state.loops[3].loop.force]]; })()"
-    )
-    dt, x, v, start = motion
-    np.testing.assert_allclose(v, np.gradient(x, dt), atol=1e-2)
-    expected = np.asarray(respond(law, dt * np.arange(len(x)), np.array(x), np.array(v)))[start:]
-    np.testing.assert_allclose(shown, expected, CLOSE, 1e-9)
-    browser.type("#frequencies", "fast")
-    assert "positive numbers" in browser.evaluate("document.getElementById('loopError').textContent")
-    assert not browser.troubles()
-
-
 def test_units_and_sign_of_a_shop(tmp_path, browser):
     measured = record(VALVE)
     with shown_in(Display("imperial", "compression-positive")):
@@ -214,62 +183,6 @@ def test_units_and_sign_of_a_shop(tmp_path, browser):
     units = browser.evaluate("[...document.querySelectorAll('#metrics .unit')].map((cell) => cell.textContent)")
     assert {"in", "lbf", "m/s²"} <= set(units)
     assert "positive in compression" in browser.evaluate("document.body.textContent")
-    assert not browser.troubles()
-
-
-@pytest.mark.slow
-def test_records_are_compared_where_the_page_follows_what_they_state(tmp_path, browser):
-    """A held command drives law and baseline; of what only a fit follows the page draws the record alone."""
-    law = Scheduled((VALVE, Besinger(1800.0, 5600.0, 1400.0, 0.25, 0.05)), [0.0, 1.0], 0.25)
-    held = dataclasses.replace(record(with_command(law, 0.8)), command=0.8)
-    stated = dataclasses.replace(held, settings={"rebound_rate": "2500 N s/m", "series": "A"})
-    commands = {"command": None, "command_channel": np.linspace(0.0, 1.0, len(held)), "command_unit": "A"}
-    runs = [held, stated, dataclasses.replace(held, **commands)]
-    with shown_in(Display(sign="compression-positive")):
-        page(law, tmp_path, browser, records=runs, duration=1.0)
-    fits = browser.evaluate("[state.fits.law.rmse, state.fits.baseline.rmse]")
-    np.testing.assert_allclose(fits, 5.0 / 2**0.5, rtol=0.02)
-    beyond = ["", "the rebound rate", "the varying command"]
-    assert browser.evaluate("DATA.records.map((record) => record.beyond)") == beyond
-    browser.choose("#motion", "2")
-    assert "does not follow the varying command" in browser.evaluate("get('fitNote').textContent")
-    assert browser.evaluate("[state.loops.length, Object.keys(state.fits).length]") == [1, 0]
-    row = "document.querySelector('tr[data-metric=working_space_mean] [data-value]')"
-    mean, shown = browser.evaluate(f"[Number({row}.dataset.value), {row}.textContent]")
-    assert mean != 0.0 and float(shown.replace("\u2212", "-")) * mean < 0.0
-    assert browser.evaluate("charts.spectrum.series[0].y.some((y) => y > 0)")
-    assert not browser.troubles()
-
-
-@pytest.mark.slow
-def test_a_file_dropped_onto_the_page(tmp_path, browser):
-    page(VALVE, tmp_path, browser)
-    measured = record(VALVE)
-    file = tmp_path / "run.csv"
-
-    def drop(header, columns):
-        np.savetxt(file, np.stack(columns, 1), fmt="%.17g", delimiter=",", header=header, comments="")
-        browser.drop(file)
-        browser.wait("state.text !== undefined")
-        browser.evaluate("new Promise((done) => setTimeout(done, 100))")
-        return browser.evaluate("document.getElementById('dropError').textContent")
-
-    assert "like: time [s],stroke [mm]" in drop("a,b,c", [measured.stroke] * 3)
-    columns = [-1e3 * measured.stroke, -measured.velocity, -1e-3 * measured.force]
-    assert "no unit" in drop("stroke,velocity [m/s],force [kN]", columns)
-    assert '"furlong"' in drop("stroke [furlong],velocity [m/s],force [kN]", columns)
-    assert "no column of force" in drop("stroke [mm],velocity [m/s],sensor 1", columns)
-    header = "time (ms),stroke [mm],velocity_m/s,Force [kN]"
-    assert "drive the machine" in drop(header, [1e3 * measured.time, *columns[:2], -columns[2]])
-    assert drop(header, [1e3 * measured.time, *columns]) == ""
-    browser.choose("#dropSign", "compression")
-    assert browser.evaluate("document.getElementById('motion').value") == "dropped"
-    force = np.asarray(respond(VALVE, measured.time, measured.stroke, measured.velocity))
-    expected = np.sqrt(np.mean((force - measured.force) ** 2))
-    assert browser.evaluate("state.fits.law.rmse") == pytest.approx(expected, CLOSE)
-    file.write_text(file.read_text().replace("\n", "\nx,1,2,3\n", 1))
-    browser.drop(file)
-    browser.wait("document.getElementById('dropError').textContent.includes('line 2, time: \"x\" is not a number')")
     assert not browser.troubles()
 
 
@@ -316,6 +229,12 @@ class Sorted(AbstractMemoryless):
 
     def force_velocity(self, v):
         return jax.numpy.sort(jax.numpy.stack([self.rate * v, 2.0 * self.rate * v]))[0]
+
+
+def test_a_road_that_does_not_last_whole_steps_is_driven_to_its_last_step(tmp_path):
+    at = np.linspace(0.0, 12.2, 62)
+    text = page(VALVE, tmp_path, duration=None, road=from_profile(at, 0.01 * np.sin(at), 24.5)).read_text("utf-8")
+    assert '"count": 498' in text  # of 0.49796 s
 
 
 def test_refusals(tmp_path):

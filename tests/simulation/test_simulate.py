@@ -1,5 +1,3 @@
-import json
-
 import diffrax
 import jax
 import jax.numpy as jnp
@@ -7,12 +5,12 @@ import numpy as np
 import pytest
 import scipy.integrate
 
-from jaxdamp import Ride, dampers, metrics, roads, simulate
+from jaxdamp import dampers, metrics, roads, simulate
 from jaxdamp.parameters import replace
 from jaxdamp.simulation import Adaptive, Exponential
 from jaxdamp.simulation.observer import recorded
 from jaxdamp.simulation.run import sampled
-from jaxdamp.vehicles.presets import m113_003, quarter_car_000
+from jaxdamp.vehicles.presets import quarter_car_000
 
 
 BESINGER = dampers.Besinger(1600.0, 4200.0, 900.0, 0.13, 0.05)
@@ -224,19 +222,6 @@ def test_to_xarray_carries_units_and_time():
     np.testing.assert_array_equal(dataset["damper_force"], response["damper_force"])
 
 
-def test_duration_of_the_road_is_used():
-    road = roads.from_profile(np.linspace(0, 0.5, 501), np.zeros(501))
-    assert float(simulate(quarter_car_000(), road).time[-1]) == pytest.approx(0.5)
-
-
-@pytest.mark.parametrize(("speed", "steps"), [(24.5, 244), (24.0, 250), (5.0, 1200)])
-def test_the_last_instant_of_a_run_is_not_beyond_the_road(speed, steps):
-    """6 m take 0.24490, 0.25 and 1.2 s: as many whole steps as there are, and all of them where nothing is left."""
-    road = roads.from_profile(np.linspace(0.0, 6.0, 61), np.zeros(61), speed=speed)
-    assert sampled(quarter_car_000(), road, None, 1e-3)[0].size == steps + 1
-    assert sampled(quarter_car_000(), road, None, 1e-3, jnp.asarray(100e-3))[0].size == steps - 99
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -274,25 +259,6 @@ def test_refuses_runs_that_make_no_sense(change, message):
         simulate(quarter_car_000(), **arguments)
 
 
-def test_a_run_that_ends_before_its_bump_says_so():
-    late = roads.superposed(roads.cosine_bump(0.06, start=1.0, duration=0.25), roads.step(0.05, start=1.2))
-    with pytest.warns(UserWarning, match="level for the whole run of 0.8 s: its bump comes later"):
-        Ride(quarter_car_000(), late, duration=0.8)
-    first, state = simulate(quarter_car_000(), late, duration=0.8, return_state=True)
-    assert first.notes == ("Nothing moves, as the road stays level. If it has a bump later, pass a longer `duration`.",)
-    assert not simulate(quarter_car_000(), late, duration=0.8, state=state).notes
-
-
-def test_comfort_of_less_than_a_second_has_no_largest_second():
-    response = simulate(quarter_car_000(), BUMP, duration=0.8)
-    comfort = response.comfort()["sprung_acceleration"]
-    assert comfort.weighted_rms > 0.0 and np.isnan(comfort.max_transient_value) and comfort.vibration_dose_value > 0.0
-    assert np.isnan(jax.jit(lambda r: r.comfort())(response)["sprung_acceleration"].max_transient_value)
-    said = json.loads(json.dumps(response.to_dict(), allow_nan=False))["comfort"]["sprung_acceleration"]
-    assert said["max_transient_value"]["value"] is None
-    assert "max transient value" in str(response.comfort_table())
-
-
 def test_a_traced_road_that_would_repeat_or_be_skipped_is_refused():
     """Speeds of a derivative or a batch are known, so that its roads are checked as others are."""
 
@@ -306,33 +272,6 @@ def test_a_traced_road_that_would_repeat_or_be_skipped_is_refused():
         jax.vmap(at)(jnp.array([10.0, 25.0]))
     with pytest.raises(ValueError, match=r"`dt` must be at most half the time over the shortest bump, 0.01 s"):
         jax.grad(over)(0.01)
-
-
-@pytest.mark.parametrize("engine", [Exponential(), Adaptive()], ids=["exponential", "adaptive"])
-@pytest.mark.exhaustive_cases("adaptive")
-def test_a_run_saved_with_stride_is_every_so_many_th_instant_of_the_run(engine):
-    """Tyre damping included: what it hears of the road is the slope at the instant, not over the stride."""
-    car = replace(quarter_car_000(LAWS["lag"]), {"tyre_damping": 300.0})
-    whole, tenth = (simulate(car, BUMP, duration=0.6, dt=2e-3, engine=engine, every=every) for every in (1, 10))
-    assert tenth.time.shape == (31,) and float(tenth.time[-1]) == pytest.approx(0.6)
-    for name, channel in whole.channels.items():
-        size = float(jnp.max(jnp.abs(channel)))
-        np.testing.assert_allclose(tenth[name], channel[::10], atol=1e-12 * size, err_msg=name)
-    for here, there in zip(tenth.final_state, whole.final_state, strict=True):
-        np.testing.assert_allclose(here, there, rtol=1e-12)
-    parts = tenth.energy_balance()
-    assert abs(float(parts["error"])) < 0.05 * float(parts["road_work"])
-
-
-def test_energies_of_a_run_saved_with_stride_are_estimates_of_the_same():
-    """Of dampers at the road, whose rate is not its slope over a stride."""
-    road = roads.iso8608("C", speed=15.0, seed=1)
-    whole, tenth = (simulate(m113_003(), road, duration=2.0, every=every) for every in (1, 10))
-    for name, energy in whole.absorbed_by().items():
-        assert float(tenth.absorbed_by()[name]) == pytest.approx(float(energy), rel=0.01)
-    balance = tenth.energy_balance()
-    assert abs(float(balance["error"])) < 1e-3 * float(balance["road_work"])
-    assert float(balance["road_work"]) == pytest.approx(float(whole.energy_balance()["road_work"]), rel=0.01)
 
 
 class Driving(dampers.AbstractMemoryless):
