@@ -161,18 +161,20 @@ def on_status(best: SearchEnd, unsettled: Sequence[str], remedy: str = "") -> li
 
 def fitted_models(problem: Problem, values: np.ndarray) -> tuple[list[Model], Model]:
     """The fitted model of each record, where they differ, and the one with the mean of what differs."""
-    warms = problem.law.traits().temperature_dependent
-    built = with_range(problem.free.started_at(values).tree, covered_range(problem.fitted_to, warms=warms))
+    built = problem.free.started_at(values).tree
     if starts := starts_in(built):
         fitted = [s if np.isfinite(sigma) else None for s, sigma in zip(starts, problem.sigma, strict=True)]
         built = on_rig(law_of(built), rig_of(built), fitted)
     own = {path: get(built, path) for path in problem.per_record}
-    if not own:
-        return [], built
     models = [
-        of_record(with_values(built, {path: v[i] for path, v in own.items()}), i) for i in range(len(problem.runs))
+        of_record(with_values(built, {path: v[i] for path, v in own.items()}), i)
+        for i in range(len(problem.runs) if own else 0)
     ]
-    return models, with_means(built, problem.per_record)
+    fitted = [model for model, sigma in zip(models, problem.sigma, strict=False) if np.isfinite(sigma)]
+    warms = problem.law.traits().temperature_dependent
+    covered = covered_range(problem.fitted_to, fitted or built, warms=warms)
+    joint = with_means(built, problem.per_record) if own else built
+    return [with_range(model, covered) for model in models], with_range(joint, covered)
 
 
 def _averaged(problem: Problem, best: SearchEnd) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._status import Status
 from jaxdamp._tables import Cell, Column, Contents, Shown, Table, plain, with_unit
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import AbstractDamper, FittedRange, Scheduled, with_fitted_range
+from jaxdamp.dampers import AbstractDamper, Scheduled, with_fitted_range
 from jaxdamp.identify.dependence import OWN, Dependence
 from jaxdamp.identify.estimates import rounded
 from jaxdamp.identify.estimating import WEAK
@@ -98,11 +98,8 @@ class ManyFits(AbstractResult):
             must, value = "name a damper that was fitted", f"{self.names[place]!r} ({self.reasons[place]})"
             _checks.refuse("name", must, value, "Take the laws of the others by name: `many[name]`.")
         runs, model = self.records[place], self.free.started_at(self.values[place]).tree
-        return with_range(with_stated(model, stated_parameters(model, runs)), self._covered(runs))
-
-    def _covered(self, runs: Sequence[BenchRun]) -> FittedRange:
-        """The range of records, with their temperatures if the law depends on them."""
-        return covered_range(runs, warms=law_of(self.free.tree).traits().temperature_dependent)
+        warms = law_of(model).traits().temperature_dependent
+        return with_range(with_stated(model, stated_parameters(model, runs)), covered_range(runs, model, warms=warms))
 
     @property
     def laws(self) -> tuple[AbstractDamper, ...]:
@@ -168,7 +165,8 @@ class ManyFits(AbstractResult):
             law = self._interpolated(setting)
         else:
             law = Scheduled((self._interpolated(low), self._interpolated(high)), [low, high], setting, "force")
-        return with_fitted_range(law, joined_range([self._covered(self.records[place]) for place in self._fitted]))
+        ranges = [law_of(self.models[place]).fitted_to for place in self._fitted]
+        return with_fitted_range(law, joined_range([each for each in ranges if each is not None]))
 
     def _blend_at(self, low: float, high: float) -> str:
         """What lies between two settings: forces if a number that is not shared is undetermined at one of them."""

@@ -195,7 +195,8 @@ def train(
     course = _course(coordinates, problem, checked, rule, steps, patience)
     fitted = np.isfinite(problem.sigma)
     warms = problem.law.traits().temperature_dependent
-    trained = with_range(_model(coordinates, course.best), covered_range(problem.fitted_to, warms=warms))
+    trained = _model(coordinates, course.best)
+    trained = with_range(trained, covered_range(problem.fitted_to, trained, warms=warms))
     percent, rmse, scores = score(trained, runs, fitted)
     held_percent, held_rmse, held_scores = score(trained, held_out)
     rate = f"`learning_rate` ({learning_rate:g})" if optimiser is None else "the learning rate of `optimiser`"

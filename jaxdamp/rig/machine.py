@@ -1,10 +1,11 @@
 """What a test machine adds to the force of a law before it stands in a record."""
 
 import dataclasses
-from typing import NamedTuple, final
+from typing import NamedTuple, TypeVar, cast, final
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array
 
 from jaxdamp import _checks
@@ -15,6 +16,9 @@ from jaxdamp.parameters import AbstractDeclared, Domain, as_float, nonnegative, 
 from jaxdamp.rig.marching import NOTHING, Followed, finer, march, slopes, step_and_rate
 from jaxdamp.rig.response import respond
 from jaxdamp.rig.sensor import delayed, delayed_straight, lagged
+
+
+A = TypeVar("A", Array, np.ndarray)
 
 
 def _not_positive() -> Domain:
@@ -226,16 +230,18 @@ def _channel(name: str, values: SignalLike, time: Signal) -> Signal:
     return channel
 
 
-def gas_and_friction(rig: Rig, stroke: Array, velocity: Array) -> tuple[Array, Array]:
+def gas_and_friction(rig: Rig, stroke: A, velocity: A) -> tuple[A, A]:
     """F_g + k (x − x₀) and F_f tanh(v/v_f) [N], which the machine adds at once, its oil at the reference temperature.
 
     Arguments:
-        rig: the machine.
+        rig: the machine; with numbers of NumPy nothing is compiled.
         stroke: measured [m].
         velocity: [m/s].
     """
     gas = rig.gas_force + rig.gas_stiffness * (stroke - rig.stroke_offset)
-    return gas, rig.friction * jnp.tanh(velocity / rig.friction_velocity)
+    ratio = velocity / rig.friction_velocity
+    friction = rig.friction * (np.tanh(ratio) if isinstance(ratio, np.ndarray) else jnp.tanh(ratio))
+    return cast(A, gas), cast(A, friction)
 
 
 @compiled_for_loops

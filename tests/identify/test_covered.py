@@ -10,6 +10,7 @@ from jaxdamp import bench, identify
 from jaxdamp.bench import BenchRun, SineTest
 from jaxdamp.dampers import Bilinear, Lag, Linear, Spring, TemperatureScaled, with_fitted_range
 from jaxdamp.identify.model import covered_range
+from jaxdamp.rig import Rig, gas_and_friction
 
 
 @pytest.fixture(scope="module")
@@ -38,6 +39,33 @@ def test_a_fit_forgets_the_range_of_its_start(runs):
     start = Lag(with_fitted_range(Linear(1000.0), velocity=(-9.0, 9.0)), 0.002)
     law: Any = identify.fit(start, runs[:1]).law
     assert law.fitted_to.velocity == ends(runs[:1], "velocity") and law.law.fitted_to is None
+
+
+def test_the_ranges_of_force_and_stroke_are_those_of_the_law_not_of_the_machine(runs):
+    machine = Rig(force_offset=-80.0, gas_force=-300.0, gas_stiffness=2e3, friction=60.0, moving_mass=3.0)
+    machine = dataclasses.replace(machine, stroke_offset=2e-3)
+
+    def measured(run: BenchRun) -> BenchRun:
+        stroke = run.stroke + 2e-3
+        gas, friction = gas_and_friction(machine, stroke, run.velocity)
+        inertia = machine.moving_mass * np.gradient(run.velocity, run.time)
+        return dataclasses.replace(run, force=run.force + gas + friction + inertia - 80.0, stroke=stroke)
+
+    shown = list(map(measured, runs))
+    laws: list[Any] = [identify.fit(Bilinear(2000.0, 1000.0), shown, rig=machine).law]
+    laws.append(identify.fit_many(Bilinear(2000.0, 1000.0), {"A": shown}, rig=machine, starts=1)["A"])
+    for law in laws:
+        assert law.fitted_to.stroke == pytest.approx(ends(runs, "stroke"), abs=1e-4)  # of 20 mm, 2 mm from the sensor
+        assert law.fitted_to.force == pytest.approx(ends(runs, "force"), abs=15.0)  # of 1300 N
+
+
+def test_the_force_of_a_law_is_without_the_zero_error_of_each_record(runs):
+    zeros = zip(runs, (-300.0, 120.0, 700.0), strict=True)
+    shown = [dataclasses.replace(run, force=run.force + zero) for run, zero in zeros]
+    result = identify.fit(Bilinear(2000.0, 1000.0), shown, rig=["offset"], per_record=["rig.force_offset"])
+    for law in (result.law, *result.record_laws):
+        covered: Any = law.fitted_to
+        assert covered.force == pytest.approx(ends(runs, "force"), abs=5.0)
 
 
 def test_temperature_and_command_are_those_of_the_records_that_state_them(runs):
