@@ -336,13 +336,19 @@ def covered_range(
     channels = {"velocity": [run.velocity for run in runs]}
     channels["stroke"], channels["force"] = ([*values] for values in zip(*inside, strict=True))
     channels["frequency"] = [np.array([run.frequency]) for run in runs]
-    channels["temperature"] = [run.temperature for run in runs if run.temperature is not None]
-    if warms and not channels["temperature"]:
-        channels["temperature"] = [np.array([t]) for run in runs if (t := initial_temperature(run)) is not None]
+    channels["temperature"] = _temperatures(runs, warms=warms)
     channels["command"] = [run.commands for run in runs if run.commands is not None]
     joined = {name: np.concatenate(values) for name, values in channels.items() if values}
     limits = {name: (float(values.min()), float(values.max())) for name, values in joined.items()}
     return FittedRange(**limits)
+
+
+def _temperatures(runs: Sequence[BenchRun], *, warms: bool) -> list[np.ndarray]:
+    """The measured temperatures [K]; if there are none and the law depends on them, those at the start."""
+    measured = [run.temperature for run in runs if run.temperature is not None]
+    if measured or not warms:
+        return measured
+    return [np.array([t]) for run in runs if (t := initial_temperature(run)) is not None]
 
 
 def _without_machine(run: BenchRun, model: Model | None) -> tuple[np.ndarray, np.ndarray]:

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from jaxdamp._one_thread import one_thread
+from jaxdamp.solve.step_models import StepModels
 
 
 RADIUS = 0.5  # largest change of a coordinate in the first step; coordinates are one at the start
@@ -264,14 +265,8 @@ class SequentialQuadratic:
         return True
 
     def _best_step(self, state: SearchState) -> tuple[np.ndarray, float]:
-        """The step to the minimum of the models in the trust region, and the improvement that they promise.
-
-        Solved for the step, the largest excess over the aims and the largest violation of a limit, all relative to
-        their values at the point, so that small improvements are not lost by rounding.
-        """
-        import scipy.optimize
-
-        count, free, region = self.scaling.objectives, len(state.y), self.region
+        """The step to the minimum of the models in the trust region, and the improvement that they promise."""
+        count, region = self.scaling.objectives, self.region
         lower, upper = (np.clip(end - state.y, -state.radius, state.radius) for end in region[:2])
         lower, upper = np.minimum(lower, 0.0), np.maximum(upper, 0.0)
         if state.fixed is not None:
@@ -282,49 +277,14 @@ class SequentialQuadratic:
         size = float(np.clip(reach.max(), 1e-12, 1.0))  # of the improvement that a step can bring
         level = self.scaling.of(state.evaluation.rows)
         level[:count] -= state.aim
-        level[:count] -= level[:count].max()
-        level, slopes, curvature = level / size, slopes / size, curvature / size
-        slack = np.zeros((len(level), 2))
-        slack[:count, 0] = slack[count:, 1] = 1.0
-        base = self.scaling.of(state.evaluation.rows)[:count] - state.aim
-        planes, plane_slopes = self._planes(state, float(base.max()))
-        planes, plane_slopes = planes / size, plane_slopes / size
-        plane_slack = np.tile(slack, (len(state.refused), 1))
-        weights, share = np.array([1.0, state.penalty]), self._share
-        gaps = region.least - region.matrix @ state.y
-        order = np.concatenate([region.matrix, np.zeros((len(region.matrix), 2))], axis=1)
-
-        def change(step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            bent = curvature @ step
-            return slopes @ step + 0.5 * bent @ step, slopes + bent
-
-        def merit(z: np.ndarray) -> tuple[float, np.ndarray]:
-            value, slope = (a[:count].sum(axis=0) for a in change(z[:free]))
-            return weights @ z[free:] + share * value, np.concatenate([share * slope, weights])
-
-        def room(z: np.ndarray) -> np.ndarray:
-            below = plane_slack @ z[free:] - planes - plane_slopes @ z[:free]
-            return np.concatenate([slack @ z[free:] - level - change(z[:free])[0], below, order @ z - gaps])
-
-        def room_slope(z: np.ndarray) -> np.ndarray:
-            below = np.concatenate([-plane_slopes, plane_slack], axis=1)
-            return np.concatenate([np.concatenate([-change(z[:free])[1], slack], axis=1), below, order])
-
-        violation = level[count:].max(initial=0.0)
-        solved = scipy.optimize.minimize(
-            merit,
-            np.concatenate([np.zeros(free), [0.0, violation]]),
-            jac=True,
-            method="SLSQP",
-            bounds=[*zip(lower, upper, strict=True), (None, None), (0.0, None)],
-            constraints={"type": "ineq", "fun": room, "jac": room_slope},
-            options={"ftol": 1e-12, "maxiter": 100},
+        base = float(level[:count].max())
+        level[:count] -= base
+        planes, plane_slopes = (part / size for part in self._planes(state, base))
+        scaled = level / size, slopes / size, curvature / size, planes, plane_slopes
+        step, promised = StepModels(*scaled, count, self._share, state.penalty).best_step(
+            lower, upper, region.matrix, region.least - region.matrix @ state.y
         )
-        step = np.clip(np.nan_to_num(solved.x[:free]), lower, upper)
-        moved, below = level + change(step)[0], (planes + plane_slopes @ step).reshape(-1, len(level))
-        after = max(moved[:count].max(), below[:, :count].max(initial=-np.inf)) + share * (moved - level)[:count].sum()
-        beyond = max(moved[count:].max(initial=0.0), below[:, count:].max(initial=0.0))
-        return step, -size * float(after + state.penalty * (beyond - violation))
+        return step, size * promised
 
     def _planes(self, state: SearchState, base: float) -> tuple[np.ndarray, np.ndarray]:
         """Values at the present point, and slopes, of the tangents of all rows at the refused points; scaled."""

@@ -51,7 +51,8 @@ def test_a_curved_valley_is_followed_to_its_end() -> None:
     assert state.converged and state.steps < 60
 
 
-@pytest.mark.parametrize(("start", "unit"), [((0.1, 0.1), 1.0), ((4.0, -4.0), 0.01)])
+@pytest.mark.parametrize("start", [(0.1, 0.1), (4.0, -4.0), (3.0, -4.0), (4.0, 3.0)])
+@pytest.mark.parametrize("unit", [0.001, 0.01, 0.1, 1.0])
 def test_a_curved_limit_holds_from_inside_and_outside_in_any_unit(start, unit) -> None:
     (state,) = solved(in_a_circle, np.array([start]), LIMITED._replace(unit=np.array([1.0, unit])))
     np.testing.assert_allclose(state.y, np.array([2.0, 1.0]) / np.sqrt(5.0), rtol=1e-6)
