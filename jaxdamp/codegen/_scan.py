@@ -83,7 +83,8 @@ class _Scan:
     ) -> tuple[list[Array], list[bool]]:
         """Many points, and which numbers of the carry each of them has for itself."""
         if any(laned[2]):
-            raise NotImplementedError("The rows of a loop must be the same for all points.")
+            reason = "A printed loop has one table of rows for all points, and here each point has its own."
+            raise NotImplementedError(f"{reason} Leave `printed` out: XLA then compiles the loop.")
         loop = self.loop((laned[0], laned[1]), traced, start, rows)
         start = [
             jnp.broadcast_to(value, (size, *value.shape)) if lane and not had else value

@@ -39,10 +39,11 @@ from jaxdamp.identify.predicting import (
     predict_runs as predict_runs,
 )
 from jaxdamp.identify.preparing import prepare
-from jaxdamp.identify.problem import AbstractResiduals as AbstractResiduals, Problem
+from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.profile import ProfileCurve as ProfileCurve
 from jaxdamp.identify.propagation import Band as Band, Evidence as Evidence, Propagated as Propagated
 from jaxdamp.identify.record_sensitivity import RecordSensitivity as RecordSensitivity
+from jaxdamp.identify.residuals import AbstractResiduals as AbstractResiduals
 from jaxdamp.identify.result import Fit as Fit
 from jaxdamp.identify.rungs import Failure as Failure, Rung as Rung
 from jaxdamp.identify.scheduling import LeftOutSetting as LeftOutSetting, ScheduledFit as ScheduledFit, fit_scheduled

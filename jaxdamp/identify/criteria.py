@@ -14,7 +14,8 @@ from jaxtyping import Array, Bool, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp.identify.noise import Noise
-from jaxdamp.identify.problem import AbstractResiduals, Problem
+from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.residuals import AbstractResiduals
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution
 from jaxdamp.parameters import FreeParameters, get, match_paths
@@ -65,6 +66,15 @@ class Priors(AbstractResiduals):
         """The same: no weight of samples changes what is known beforehand."""
         del factor
         return self
+
+    @property
+    def relative(self) -> bool:
+        """Whether they count beside what the records show."""
+        return not self.weak
+
+    def at_noise(self, noise: float) -> "Priors":
+        """The same beside samples with noise of this standard deviation."""
+        return eqx.tree_at(lambda p: p.noise, self, jnp.asarray(noise))
 
     def used(self) -> Bool[np.ndarray, " samples"]:
         """They are no samples of the records."""
@@ -128,8 +138,13 @@ class Round(NamedTuple):
             return None
         relative = missed / unit
         weight = np.where(used, LOSSES[loss].weight(relative), 1.0)
-        problem = _weighted(plain, np.sqrt(weight), noise)._replace(
-            noise_factor=noise_factor(LOSSES[loss], relative[used]), share_left_out=float(np.mean(weight[used] < HALF))
+        problem = (
+            plain.reweighted(np.sqrt(weight))
+            .at_noise(noise)
+            ._replace(
+                noise_factor=noise_factor(LOSSES[loss], relative[used]),
+                share_left_out=float(np.mean(weight[used] < HALF)),
+            )
         )
         return Round(problem, np.sqrt(weight))
 
@@ -146,13 +161,13 @@ def solve_by(
     """Minimise a loss, with priors if the problem has any: least squares again and again, with new weights.
 
     Returns:
-        The problem of the last round, with its weights, and its solution.
+        The problem of the last round, with its weights, and its solution, with the noise that priors are relative to.
     """
     solution = solve(problem, starts)
     priors = [part for part in problem.residuals if isinstance(part, Priors)]
     if loss == "squares" and not priors:
         return problem, solution
-    rounds = 1 if loss == "squares" and all(part.weak for part in priors) else ROUNDS
+    rounds = 1 if loss == "squares" and not any(part.relative for part in priors) else ROUNDS
     now = Round(problem)
     for _ in range(rounds):
         best = solution.best
@@ -162,7 +177,7 @@ def solve_by(
         after = now.after(problem, best.residual, level, loss, spread)
         if after is None:
             break
-        now, solution = after, solve(after.problem.started_at(best.values), 1)
+        now, solution = after, solve(after.problem.started_at(best.values), 1)._replace(noise=level)
         length = np.linalg.norm(solution.best.jacobian, axis=0)
         moved = np.abs(solution.best.values - best.values) * length
         if np.all(moved < SETTLED * level):
@@ -176,15 +191,6 @@ def noise_factor(loss: Loss, relative: np.ndarray) -> float:
     shown = np.mean(weight * relative**2) / np.mean(weight)
     slope = np.mean(loss.slope(relative))
     return float(np.sqrt(np.mean((weight * relative) ** 2) / slope**2 / shown)) if shown > 0 and slope > 0 else 1.0
-
-
-def _weighted(problem: Problem, root: Float[np.ndarray, " samples"], noise: float) -> Problem:
-    """The problem with weights times `root`, and priors relative to this noise."""
-    parts = (
-        eqx.tree_at(lambda p: p.noise, part, jnp.asarray(noise)) if isinstance(part, Priors) else part
-        for part in problem.reweighted(root).residuals
-    )
-    return problem._replace(residuals=tuple(parts))
 
 
 def criterion_in_words(problem: Problem, loss: str, priors: Mapping[str, Sequence[float]]) -> str:

@@ -181,7 +181,7 @@ def fit(
     refuse_several_laws(problem.free.tree, problem.fitted_to, settings)
 
     def by_squares(problem: Problem, starts: int | None) -> Solution:
-        return solve(problem, starts=starts, max_steps=settings["max_steps"], solver=settings["solver"])
+        return _least_squares(problem, starts, settings["max_steps"], settings["solver"])
 
     noise = functools.partial(noise_of, force_noise=force_noise)
     problem, solution = solve_by(problem, by_squares, loss=loss, noise=noise, starts=starts)
@@ -212,11 +212,12 @@ def fit(
     )
 
 
-@one_thread()
 def solve(
     problem: Problem, *, starts: int | None = None, max_steps: int = 200, solver: Solver | None = None
 ) -> Solution:
     """The second step of `fit`: minimise the sum of squares of a problem.
+
+    Priors count relative to the noise of the records, which is estimated between rounds, as in `fit`.
 
     Arguments:
         problem: result of `prepare`.
@@ -227,6 +228,19 @@ def solve(
     Raises:
         ValueError: counts below one; a solver of another kind.
     """
+
+    def by_squares(problem: Problem, starts: int | None) -> Solution:
+        return _least_squares(problem, starts, max_steps, solver)
+
+    if problem.noise_known:
+        return by_squares(problem, starts)
+    noise = functools.partial(noise_of, force_noise=None)
+    return solve_by(problem, by_squares, loss="squares", noise=noise, starts=starts)[1]
+
+
+@one_thread()
+def _least_squares(problem: Problem, starts: int | None, max_steps: int, solver: Solver | None) -> Solution:
+    """The minimum of the sum of squares of a problem as it is."""
     _checks.counts(max_steps=max_steps, starts=starts)
     if solver is not None and not isinstance(solver, Solver):
         remedy = "For example `optimistix.Dogleg(rtol=1e-8, atol=1e-8)`."

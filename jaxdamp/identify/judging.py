@@ -44,8 +44,9 @@ from jaxdamp.identify.model import (
 )
 from jaxdamp.identify.noise import Noise, noise_of
 from jaxdamp.identify.predicting import predict_runs, score
-from jaxdamp.identify.problem import AbstractResiduals, Problem, linearised
+from jaxdamp.identify.problem import Problem, linearised
 from jaxdamp.identify.propagation import Evidence
+from jaxdamp.identify.residuals import AbstractResiduals
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution
 from jaxdamp.identify.stated import start_paths, stated_values
@@ -71,7 +72,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     Raises:
         ValueError: forces or derivatives that are not finite at the minimum.
     """
-    best = solution.best
+    best, problem = solution.best, problem.at_noise(solution.noise)
     if not best.finite:
         must = "give finite forces and derivatives over the records"
         _checks.refuse(

@@ -113,7 +113,8 @@ class Beginning(NamedTuple):
             owner = np.concatenate([owner, *(np.zeros(part.size, owner.dtype) for part in priors)])
             steps = tuple(at.block / run.sampling_rate for at, run in zip(ranges, runs, strict=True))
             of_records = (level, runs, tuple(deviations), owner, reach, self.law, self.per_record, each, steps, where)
-            problems.append(Problem(self.free, (*residuals, *priors), *of_records, self.initial_state))
+            problem = Problem(self.free, (*residuals, *priors), *of_records, self.initial_state)
+            problems.append(problem._replace(noise_known=not priors))
         return tuple(problems)
 
 
@@ -235,6 +236,9 @@ def weights(weighting: str | Sequence[float] | np.ndarray, runs: Sequence[BenchR
         sigma = [float(np.sqrt(np.mean(run.force**2) * len(run))) for run in runs]
         _checks.positive("runs", np.array(sigma), "A record without force has no RMS force to be weighted by.")
         return sigma
+    remedy = "Give 'samples', 'runs', or the standard deviation of the force of each record [N]."
+    if np.ndim(weighting) != 1 or np.asarray(weighting).dtype.kind not in "iuf":
+        _checks.refuse("weighting", "be a word or a number for each record", weighting, remedy)
     sigma = [float(s) for s in weighting]
     if len(sigma) != len(runs):
         _checks.refuse("weighting", f"give one number for each of {len(runs)} records", f"{len(sigma)} numbers")

@@ -17,7 +17,7 @@ from jaxdamp._traced import is_traced
 from jaxdamp._triangles import triangle
 from jaxdamp.dampers import laws_inside
 from jaxdamp.identify.model import Model, law_of, rig_of, starts_in
-from jaxdamp.identify.problem import AbstractResiduals
+from jaxdamp.identify.residuals import AbstractResiduals
 from jaxdamp.identify.traces import Batch
 from jaxdamp.parameters import FreeParameters, get, with_values
 from jaxdamp.rig import (

@@ -1,77 +1,26 @@
 """A fit as a least-squares problem: residuals as functions of a model with free parameters."""
 
 import dataclasses
-from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Bool, Float, Int, PyTree
 
+from jaxdamp import _checks
 from jaxdamp._quickly import compiled_for_loops
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import Reach, laws_inside, margins
+from jaxdamp.identify.residuals import AbstractResiduals
 from jaxdamp.parameters import Coordinates, FreeParameters
 from jaxdamp.solve import BoundedLevenbergMarquardt, ImplicitWithinBounds
 
 
 ROUNDING = 1e-8  # residual, relative to the force, below which there is nothing left to explain
-W = TypeVar("W", bound="AbstractWeighted")  # not `Self`, which run-time type checks refuse
 SENSORS = "sensors."  # with which the paths of numbers begin that act on channels after a simulation
-
-
-class AbstractResiduals(eqx.Module):
-    """Measured numbers that a model should explain."""
-
-    @abstractmethod
-    def __call__(self, model: PyTree) -> Float[Array, " samples"]:
-        """Weighted difference between model and measurement; zero for samples that are not used."""
-
-    def observed(self, model: PyTree) -> PyTree:
-        """What of the residuals a simulation gives, whatever the sensors add; nothing where none is needed."""
-
-    def compared(self, model: PyTree, observed: PyTree) -> Float[Array, " samples"]:
-        """The residuals from what `observed` gives and the sensors of the model."""
-        return self(model)
-
-    @abstractmethod
-    def used(self) -> Bool[np.ndarray, " samples"]:
-        """Which samples are used; the others are padding, or before the model has settled."""
-
-    def reweighted(self, factor: Float[np.ndarray, " samples"]) -> "AbstractResiduals":
-        """The same with every weight times a factor."""
-        raise NotImplementedError(f"{type(self).__name__} cannot be reweighted.")
-
-    def measurements(self) -> Float[Array, " numbers"]:
-        """The measured numbers, as the residuals are compared with them; none where they cannot be exchanged."""
-        return jnp.zeros(0)
-
-    def with_measurements(self, numbers: Float[Array, " numbers"]) -> "AbstractResiduals":
-        """The same with other measured numbers."""
-        return self
-
-    def linear_rows(self, free: FreeParameters) -> Float[np.ndarray, "rows columns"] | None:
-        """Derivatives by the free numbers and, last, the residual where these are zero; None where not linear."""
-        del free
-
-
-class AbstractWeighted(AbstractResiduals):
-    """Channels of records, of which samples without weight do not count."""
-
-    weight: eqx.AbstractVar[Float[Array, "..."]]
-
-    def reweighted(self: W, factor: Float[np.ndarray, " samples"]) -> W:
-        """The same with every weight times a factor."""
-        weight = np.asarray(self.weight)
-        return dataclasses.replace(self, weight=jnp.asarray(weight * factor.reshape(weight.shape), float))
-
-    def used(self) -> Bool[np.ndarray, " samples"]:
-        """Which samples count."""
-        return np.ravel(self.weight) > 0
 
 
 class Problem(NamedTuple):
@@ -99,6 +48,7 @@ class Problem(NamedTuple):
         share_left_out: share of the samples that a robust loss gives less than half weight.
         anchor: values that free numbers keep where the records say nothing of them, and the weight of one unit of each
             beside the residuals; None for a fit without.
+        noise_known: whether priors, if there are any, count relative to the noise that a fit has shown (`at_noise`).
     """
 
     free: FreeParameters
@@ -117,6 +67,7 @@ class Problem(NamedTuple):
     noise_factor: float = 1.0
     share_left_out: float = 0.0
     anchor: tuple[Float[np.ndarray, " free"], Float[np.ndarray, " free"]] | None = None
+    noise_known: bool = True
 
     def residual(self, values: Float[Array, " free"]) -> Float[Array, " samples"]:
         """All weighted residuals at these physical values of the free numbers (`free.values` at the start).
@@ -174,7 +125,13 @@ class Problem(NamedTuple):
 
         Arguments:
             tolerance: length of the last step, in standard errors.
+
+        Raises:
+            ValueError: priors relative to a noise that is not known yet.
         """
+        if not self.noise_known and any(part.relative for part in self.residuals):
+            must = "know the noise of the records, relative to which priors count and which only a fit shows"
+            _checks.refuse("problem", must, "new", "Take `problem.at_noise(identify.solve(problem).noise)`.")
         lower, upper = (jnp.asarray(side) for side in self.coordinates.bounds())
         conditions = self.margins if self.has_conditions else None
         return BoundedLevenbergMarquardt(
@@ -196,6 +153,9 @@ class Problem(NamedTuple):
 
         Returns:
             The values; not numbers where the search did not converge.
+
+        Raises:
+            ValueError: priors relative to a noise that is not known yet.
 
         >>> from jaxdamp import bench, dampers, identify
         >>> runs = bench.VirtualDyno(dampers.Linear(1500.0)).run([bench.SineTest(amplitude=0.02, frequency=2.0)])
@@ -230,6 +190,18 @@ class Problem(NamedTuple):
     def reweighted(self, factor: Float[np.ndarray, " samples"]) -> "Problem":
         """The same with the weight of every sample times a factor; the compiled programs are the same."""
         return self._replace(residuals=tuple(part.reweighted(own) for part, own in self.by_part(factor)))
+
+    def at_noise(self, noise: float | None) -> "Problem":
+        """The same with priors relative to this standard deviation of the noise of a weighted sample.
+
+        Only a fit shows it: `problem.at_noise(identify.solve(problem).noise)`.
+
+        Arguments:
+            noise: in the unit of the residuals; None, of a problem without priors, leaves all as it is.
+        """
+        if noise is None:
+            return self
+        return self._replace(residuals=tuple(part.at_noise(noise) for part in self.residuals), noise_known=True)
 
     def by_part(
         self, values: Float[np.ndarray, " samples"]

@@ -16,8 +16,9 @@ from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Contents, Table
 from jaxdamp.identify.criteria import Priors
 from jaxdamp.identify.estimating import at_ends
-from jaxdamp.identify.problem import AbstractResiduals, Problem
+from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.propagation import Evidence
+from jaxdamp.identify.residuals import AbstractResiduals
 from jaxdamp.identify.traces import signals
 from jaxdamp.parameters import FreeParameters
 

@@ -20,7 +20,8 @@ from jaxdamp._status import Status
 from jaxdamp._triangles import triangle
 from jaxdamp.dampers import laws_inside, margins
 from jaxdamp.identify.printed import Evaluator, evaluator, evaluators
-from jaxdamp.identify.problem import AbstractResiduals, Problem, linearised
+from jaxdamp.identify.problem import Problem, linearised
+from jaxdamp.identify.residuals import AbstractResiduals
 from jaxdamp.parameters import Coordinates
 from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, least_squares_on_host
 

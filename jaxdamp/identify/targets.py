@@ -22,7 +22,8 @@ from jaxdamp.identify.criteria import LOSSES, criterion_in_words, priors_on, sol
 from jaxdamp.identify.estimating import estimate
 from jaxdamp.identify.judging import MOST_WARNINGS, fields_of_fit, on_status
 from jaxdamp.identify.noise import Noise, independent
-from jaxdamp.identify.problem import AbstractResiduals, Problem
+from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.residuals import AbstractResiduals
 from jaxdamp.identify.result import Fit
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.settings import TARGETS, Free, TargetSettings

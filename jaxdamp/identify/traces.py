@@ -21,7 +21,7 @@ from jaxdamp.identify.model import (
     marched,
     starts_in,
 )
-from jaxdamp.identify.problem import AbstractResiduals, AbstractWeighted
+from jaxdamp.identify.residuals import AbstractResiduals, AbstractWeighted
 from jaxdamp.identify.rows import (
     LAG_ANGLE,
     Row,

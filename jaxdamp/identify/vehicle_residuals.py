@@ -16,7 +16,7 @@ from jaxdamp._settings import part, with_defaults
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.model import VehicleTest, on_rig
-from jaxdamp.identify.problem import AbstractResiduals, AbstractWeighted
+from jaxdamp.identify.residuals import AbstractResiduals, AbstractWeighted
 from jaxdamp.identify.traces import Batch, batches, owners
 from jaxdamp.parameters import get, with_values
 from jaxdamp.rig import Sensor

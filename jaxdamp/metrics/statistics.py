@@ -10,6 +10,7 @@ import functools
 from collections.abc import Callable
 from typing import NamedTuple, SupportsIndex, TypeAlias, final
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
 
@@ -28,6 +29,7 @@ class Reduction(enum.Enum):
     """How a term combines its values over the samples."""
 
     SUM = "sum"
+    LOG_SUM = "logarithm of the sum of exponentials"
     LARGEST = "largest"
     SMALLEST = "smallest"
     FIRST = "first"
@@ -38,6 +40,8 @@ class Reduction(enum.Enum):
         match self:
             case Reduction.SUM:
                 return before + value
+            case Reduction.LOG_SUM:
+                return jnp.logaddexp(before, value)
             case Reduction.LARGEST:
                 return at_least(before, value)
             case Reduction.SMALLEST:
@@ -52,6 +56,8 @@ class Reduction(enum.Enum):
         match self:
             case Reduction.SUM:
                 return jnp.sum(values)
+            case Reduction.LOG_SUM:
+                return jax.nn.logsumexp(values)
             case Reduction.LARGEST:
                 return largest(values)
             case Reduction.SMALLEST:

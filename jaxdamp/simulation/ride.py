@@ -58,7 +58,7 @@ class Ride(eqx.Module):
     On a white road (`roads.white`) the same call gives the stationary ride: metrics that follow from an RMS, without a
     run. Each law is replaced by the linear one that is equivalent in the motion that results, taken as normally
     distributed (`vehicles.linearise` says how accurate that is); `equivalent_dampers` names it. `duration`, `dt`,
-    `substeps` and `engine` then mean nothing.
+    `substeps` and `engine` are then refused.
 
     Metrics are gathered, but for those that need the whole record (`percentile`, "max_transient_value", a function of
     your own): their channels are saved, so that memory grows with the run.
@@ -115,11 +115,12 @@ class Ride(eqx.Module):
         chosen, self.vehicle = vehicle.chosen_metrics(metrics, white=white), vehicle
         if isinstance(road, WhiteRoad):
             refuse_controller(vehicle, "a ride on a white road")
-            for name, value in (("duration", duration), ("substeps", substeps), ("engine", engine)):
+            unused = {"duration": duration, "dt": dt, "substeps": substeps, "engine": engine}
+            for name, value in unused.items():
                 if value is not None:
                     remedy = "Leave it out: the answer is that of the stationary motion, without a run."
                     _checks.refuse(name, "not be given on a white road", value, remedy)
-            self.road, self.heights, self.dt = road, None, 1e-3 if dt is None else dt
+            self.road, self.heights, self.dt = road, None, 1e-3
             self.engine, self.layout = Exponential(), MemoryLayout.ARRAY
             self.metrics = _stationary(vehicle, chosen, all_of_them=metrics is None)
             return

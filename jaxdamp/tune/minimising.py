@@ -317,17 +317,19 @@ def _relaxation(task: DesignTask[V], ended: Ended, limits: tuple[Sequence[Limit]
         reached = [(ends[i], ends[i].sign * rows[1 + i]) for i in worst.values()]
         moved = [_moved(of[end.name], end, to + end.sign * OUTWARDS * abs(to)) for end, to in reached]
         return f"Within reach: {' and '.join(moved)}."
-    prices: dict[tuple[str, float], float] = {}
+    prices: dict[tuple[str, float], list[tuple[float, int]]] = {}
     for i, price in _prices(task, ended, limit_ends(limits[1])).items():
-        limit, sign = of[ends[i].name], ends[i].sign
+        limit, end = of[ends[i].name], ends[i]
         if not limit.is_shape:
-            prices[limit.of, sign] = prices.get((limit.of, sign), 0.0) + price * ends[i].scale
-    dearest = max(prices, key=lambda key: prices[key], default=None)
-    if dearest is None:
+            prices.setdefault((limit.of, end.sign), []).append((price * end.scale, i))
+    totals = {limit: sum(price for price, _ in own) for limit, own in prices.items()}
+    if not totals:
         return ""
-    end = next(end for end in ends if (of[end.name].of, end.sign) == dearest)
-    to = end.value + end.sign * end.scale * SHARE * abs(float(rows[0])) / prices[dearest]
-    return f"Cheapest for 1 % less {task.objective.name}: {_moved(of[end.name], end, to)}."
+    dearest = max(totals, key=totals.__getitem__)
+    end = ends[max(prices[dearest])[1]]
+    to = end.value + end.sign * end.scale * SHARE * abs(float(rows[0])) / totals[dearest]
+    alike = ", and all others of this limit alike" * (len({e.name for e in ends if of[e.name].of == dearest[0]}) > 1)
+    return f"Cheapest for 1 % less {task.objective.name}: {_moved(of[end.name], end, to)}{alike}."
 
 
 def _prices(task: DesignTask[V], ended: Ended, ends: Sequence[LimitEnd]) -> dict[int, float]:

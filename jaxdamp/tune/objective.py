@@ -28,21 +28,25 @@ from jaxdamp.tune.limits import Ends, Limits
 from jaxdamp.vehicles import AbstractVehicle, is_stationary
 
 
-DOUBLINGS = 5  # of the exponent: the smooth peak has the power 32
+POWER = 32  # of the smooth peak
+LEAST = 1e-30  # added to a size whose logarithm is taken
 
 
-def _powers(y: Array, first: Array | None) -> Array:
-    """An even power, by squaring."""
-    del first
-    for _ in range(DOUBLINGS):
-        y = y * y
-    return y
+def _logarithm(power: int) -> Callable[[Array, object], Array]:
+    """Of a power of |y|, which as a number would overflow in single precision from 16 on, and vanish below 0.06."""
+    return lambda y, _: power * jnp.log(jnp.abs(y) + LEAST)
+
+
+def _exponential(logarithm: Scalar) -> Scalar:
+    """Of a logarithm of a size; zero for `LEAST`."""
+    size = jnp.exp(logarithm)
+    return jnp.where(size > 2.0 * LEAST, size, 0.0)
 
 
 SMOOTH_PEAK = Statistic(
     "smooth_peak",
-    (Term(Reduction.SUM, _powers), Term(Reduction.SUM, lambda y, first: _powers(y, first) * jnp.abs(y))),
-    lambda sums, count, dt: jnp.where(sums[0] > 0.0, sums[1] / jnp.where(sums[0] > 0.0, sums[0], 1.0), 0.0),
+    (Term(Reduction.LOG_SUM, _logarithm(POWER)), Term(Reduction.LOG_SUM, _logarithm(POWER + 1))),
+    lambda logarithms, count, dt: _exponential(logarithms[1] - logarithms[0]),
 )
 SMOOTH_SETTLING = Statistic(
     "smooth_settling_time", of_record=lambda record, dt: smooth_settling_time(record, dt), unit=lambda _: "s"

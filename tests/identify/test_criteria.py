@@ -8,8 +8,8 @@ import pytest
 from scipy.signal import lfilter
 
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import Besinger, Bilinear, Linear
-from jaxdamp.identify import fit
+from jaxdamp.dampers import Besinger, Bilinear, Lag, Linear
+from jaxdamp.identify import fit, judge, prepare, solve
 
 
 TRUTH = Bilinear(2600.0, 1200.0)
@@ -53,6 +53,22 @@ def test_a_prior_is_weighed_against_the_records(sines):
     assert result.criterion.startswith("priors rate 15")
     estimated = fit(Linear(1000.0), runs, priors={"rate": (mean, error)})  # with the noise that the residual shows
     assert estimated["rate"].value == pytest.approx(result["rate"].value, abs=0.1 * error)
+
+
+@pytest.mark.parametrize("start", [Bilinear(2000.0, 2000.0), Lag(Bilinear(2000.0, 2000.0), 1e-3)])
+def test_three_steps_and_a_program_weigh_a_prior_as_a_fit_does(sines, start):
+    runs, priors = sines(TRUTH, noise=20.0), {"rebound_rate": (2500.0, 5.0)}
+    whole = fit(start, runs, starts=1, priors=priors)
+    problem = prepare(start, runs, priors=priors)
+    solution = solve(problem, starts=1)
+    steps = judge(problem, solution)
+    error = whole["rebound_rate"].standard_error
+    assert steps["rebound_rate"].value == pytest.approx(whole["rebound_rate"].value, abs=0.01 * error)
+    assert steps["rebound_rate"].standard_error == pytest.approx(error, rel=1e-3)
+    with pytest.raises(ValueError, match=r"noise of the records.*problem\.at_noise\(identify\.solve\(problem\)"):
+        problem.minimum()
+    values = problem.at_noise(solution.noise).minimum()
+    np.testing.assert_allclose(values, [p.value for p in whole.parameters], atol=0.01 * error, rtol=1e-4)
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.95])
@@ -101,6 +117,9 @@ def test_the_bias_by_noise_of_the_velocity_is_reported(sines):
     ("options", "message"),
     [
         ({"loss": "hubber"}, "Did you mean 'huber'"),
+        ({"weighting": None}, "`weighting` must be a word or a number for each record"),
+        ({"weighting": 50.0}, r"but is 50\.0\. Give 'samples', 'runs', or"),
+        ({"weighting": ["a"]}, "`weighting` must be a word or a number for each record"),
         ({"input_noise": (-1.0, 0.0)}, "`input_noise` must be"),
         ({"priors": {"rat": (1.0, 1.0)}}, "No parameter is named 'rat'"),
         ({"priors": {"rate": (1.0, 0.0)}}, "be a mean and a positive standard deviation"),

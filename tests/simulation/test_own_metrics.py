@@ -134,6 +134,8 @@ def test_on_a_white_road_a_ride_is_stationary():
         Ride(CAR, white, metrics=["peak_sprung_acceleration"])
     with pytest.raises(ValueError, match="`duration` must not be given on a white road"):
         Ride(CAR, white, duration=3.0)
+    with pytest.raises(ValueError, match="`dt` must not be given on a white road"):
+        Ride(CAR, white, dt=3.0)
     exciting = vehicles.presets.quarter_car_000(dampers.Polynomial([0.0, -2000.0]))
     with pytest.raises(ValueError, match=r"come to rest .* One of its motions is not damped: `vehicles.modes"):
         Ride(exciting, white, metrics=chosen)()

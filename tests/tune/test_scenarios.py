@@ -1,5 +1,6 @@
 """Scenarios: many roads and conditions as one ride, and tunings over them."""
 
+import re
 from typing import Any
 
 import equinox as eqx
@@ -185,3 +186,17 @@ def test_fresh_roads_of_fixed_amplitudes_keep_the_spectrum_and_the_coherence_of_
     assert DRIVEN["bump"].reseeded(1) is None
     others = tune.Scenarios(DRIVEN).on_other_roads(3)
     assert others is not None and eqx.tree_equal(others.scenarios[1].road, DRIVEN["bump"])
+
+
+def test_the_limit_that_is_to_be_relaxed_is_one_that_holds_the_search() -> None:
+    ways = {name: roads.iso8608(name, speed, seed=1, duration=1.0) for name, speed in (("C", 20.0), ("D", 10.0))}
+    conditions = {"empty": AS_IT_IS, "laden": tune.Condition({"sprung_mass": 1500.0})}
+    car, limits = vehicles.presets.quarter_car_000(dampers.Bilinear(3000.0, 1500.0)), {"rms_dynamic_tyre_load": "+2%"}
+    result = tune.minimise(
+        ACCELERATION, car, tune.Scenarios(ways, conditions), limits=limits, fresh_roads=0, duration=1.0
+    )
+    words = re.fullmatch(
+        r".*: (\w+) in ('.*') ≤ .* instead of (.*), and all others of this limit alike\.", result.relaxation
+    )
+    assert words is not None and "{0} ≤ {2}, in {1}".format(*words.groups()) in result.active
+    assert not any("'C, empty'" in active for active in result.active)  # the first scenario

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -127,3 +128,17 @@ def test_targets_are_met_and_noted() -> None:
     assert result.parameters[0].after == pytest.approx(3000.0, rel=1e-3)
     notes = {row["metric"]: row["note"] for row in result.table().records()}
     assert notes["targets"] == "minimised" and all(str(notes[name]).endswith(", met") for name in names)
+
+
+@pytest.mark.parametrize("precision", [np.float32, np.float64])
+@pytest.mark.parametrize("size", [0.0, 1e-4, 0.03, 2e3, 3e5])  # of a stroke to a load, in SI
+def test_a_smooth_peak_is_near_the_peak_in_any_unit_and_precision(precision, size):
+    statistic = tune.smooth_peak("stroke").statistic
+    wave = (size * np.sin(np.linspace(0.0, 20.0, 401))).astype(precision)
+    gathered = jax.lax.scan(lambda so_far, y: (statistic.add(so_far, y), None), statistic.begin(wave[0]), wave[1:])[0]
+    exact = wave.astype(float)
+    expected = np.sum(np.abs(exact) ** 33) / np.sum(exact**32) if size else 0.0
+    for value in (statistic.of(jnp.asarray(wave), 0.05), statistic.end(gathered, 401, 0.05)):
+        np.testing.assert_allclose(value, expected, rtol=1e-4 if precision is np.float32 else 1e-11)
+    slopes = jax.grad(lambda y: statistic.of(y, 0.05))(jnp.asarray(wave))
+    assert np.all(np.isfinite(slopes))
