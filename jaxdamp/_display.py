@@ -48,7 +48,7 @@ _AMOUNT = re.compile(
 )
 _SIGNED = re.compile(
     r"(mid-stroke |stated )?(rebound |compression |mean |static |gas |least |largest )?(force|velocity|stroke)( at .*)?"
-    r"|(\w+_)?working_space_mean"
+    r"|(\w+_)?working_space_mean|(\w+ )*suspension travel, mean( \[.*)?"
 )
 _ENDS = (("lowest", "highest"), ("fitted from", "fitted to"), ("least force", "largest force"), ("from", "to"))
 _ENDS += (("minimum", "maximum"),)
@@ -57,6 +57,8 @@ _PHRASES = {  # of the library's sign, and of the other
     "+ rebound": "+ compression",
     "rebound positive": "compression positive",
     "+ resists extension": "+ resists compression",
+    "positive where it resists extension": "positive where it resists compression",
+    "extension positive": "compression positive",
     "positive in rebound": "positive in compression",
     "positive in extension (rebound)": "positive in compression",
     "positive when it resists extension": "positive when it resists compression",
@@ -142,8 +144,11 @@ class Display:
         return shown._replace(factor=-shown.factor) if signed and self.sign == COMPRESSION else shown
 
     def signed(self, quantity: str) -> bool:
-        """Whether the sign of a quantity is that of the direction, by its name: "rebound force at 0.1 m/s"."""
-        return bool(_SIGNED.fullmatch(quantity))
+        """Whether the sign of a quantity is that of the direction, by its name or its label.
+
+        Such as "rebound force at 0.1 m/s", or "stroke [mm] (+ rebound)".
+        """
+        return bool(_SIGNED.fullmatch(quantity) or _SIGN_WORDS.search(quantity))
 
     def turned(self, names: tuple[str, ...]) -> list[int]:
         """The order in which columns of lowest and highest values are shown, by their names."""

@@ -117,12 +117,14 @@ class Table:
 
     def _row_shown(self, present: Display, row: tuple[Cell, ...]) -> tuple[Cell, ...]:
         by_name = dict(zip((column.name for column in self.columns), row, strict=True))
-        unit, quantity = str(by_name.get("unit", "")), str(by_name.get("quantity") or by_name.get("metric", ""))
+        unit, quantity = str(by_name.get("unit", "")), str(next(filter(None, map(by_name.get, _QUANTITIES)), ""))
+        factors = [_factor(present, column, unit, quantity) for column in self.columns]
         cells = [
-            _cell_shown(present, column, cell, unit, quantity) for column, cell in zip(self.columns, row, strict=True)
+            _unit_shown(present, str(cell)) if column.name == "unit" else _scaled(cell, factor)
+            for column, cell, factor in zip(self.columns, row, factors, strict=True)
         ]
-        turned, signed = present.turned(tuple(c.name for c in self.columns)), present.signed(quantity)
-        return tuple(cells[to if signed or self.columns[to].unit else at] for at, to in enumerate(turned))
+        turned = present.turned(tuple(column.name for column in self.columns))
+        return tuple(cells[to if factors[to] < 0.0 else at] for at, to in enumerate(turned))
 
     def texts(self) -> list[tuple[str, ...]]:
         """The rows for reading."""
@@ -220,28 +222,31 @@ def _html_cell(text: str, side: str, named: bool, *, words: bool) -> str:
 
 _COUNTS = ("count", "cycles", "wheels", "ratio", "times", "(value − true)/se")  # columns whose numbers have no unit
 _SPREADS = ("scatter", "uncertainty", "standard error", "change")  # and those without a sign
+_QUANTITIES = ("quantity", "metric", "finding")  # columns that say what the numbers of a row are
+_BAND = ("from", "to")  # of a force; times and distances have no direction
 
 
-def _cell_shown(present: Display, column: Column, cell: Cell, unit: str, quantity: str) -> Cell:
-    """A cell in the units and the sign that are shown, of a row with this unit and quantity, if it states them."""
-    if column.name == "unit":
-        return _unit_shown(present, str(cell))
+def _factor(present: Display, column: Column, unit: str, quantity: str) -> float:
+    """What a number is shown times, of a row with this unit and quantity, if it states them."""
     own = column.unit or ("" if column.name in _COUNTS else unit)
-    if not isinstance(cell, float) or own in ("", "–", "%"):
-        return cell
+    if own in ("", "–", "%"):
+        return 1.0
     signed = present.signed(column.name if column.unit else quantity) and column.name not in _SPREADS
+    signed |= column.unit == "N" and column.name in _BAND
     signed &= not (quantity and column.name == "velocity")  # it is positive, the direction is in the quantity
-    return _scaled(cell, present.of(own.replace("²", "^2"), signed=signed).factor)
+    return present.of(own.replace("²", "^2"), signed=signed).factor
 
 
 def _unit_shown(present: Display, unit: str) -> str:
     return typeset_unit(present.of(unit.replace("²", "^2")).unit, "")
 
 
-def _scaled(cell: float, factor: float) -> float:
+def _scaled(cell: Cell, factor: float) -> Cell:
     """A number of a table times a factor; the text of a `Shown` keeps what its digits say."""
+    if factor == 1.0 or not isinstance(cell, float):
+        return cell
     value = cell * factor + 0.0
-    if factor == 1.0 or not isinstance(cell, Shown):
+    if not isinstance(cell, Shown):
         return value
     _, sign, error = cell.text.partition(" ± ")
     if sign:

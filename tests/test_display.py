@@ -5,6 +5,7 @@ import pytest
 
 from jaxdamp._display import Display, display, shown_in
 from jaxdamp._tables import Column, Shown, Table
+from jaxdamp.bench import Finding, Preflight
 from jaxdamp.plots import _style
 
 
@@ -64,6 +65,32 @@ def test_lowest_and_highest_change_places_with_the_sign():
         assert ride.shown().rows == (("front_working_space_mean", "m", 0.01, -0.02), metrics[1])
         assert ends.shown().rows == (("a", -700.0, 300.0),)
         assert spans.shown().rows == (("velocity", "m/s", -0.9, 0.5), ("frequency", "Hz", 1.0, 5.0))
+
+
+def test_times_and_distances_keep_their_ends_and_findings_are_turned_by_their_names():
+    found = [
+        Finding("warning", "rest before", ("a",), "", 1.1, "s", (0.0, 1.1)),
+        Finding("note", "gas force", ("a",), "", -150.0, "N"),
+    ]
+    columns = (Column("velocity", "m/s"), *(Column(name, "N") for name in ("force", "from", "to")))
+    band = Table("", columns, ((0.1, 200.0, 150.0, 260.0),))
+    roughness = Table("", (Column("from", "m"), Column("to", "m")), ((0.0, 100.0),))
+    with shown_in(Display(sign="compression-positive")):
+        rows = (
+            Preflight(tuple(found), ("a",)).table().only(columns=["from", "to", "finding", "size", "unit"]).shown().rows
+        )
+        assert rows == ((0.0, 1.1, "rest before", 1.1, "s"), (None, None, "gas force", 150.0, "N"))
+        assert band.shown().rows == ((-0.1, -200.0, -260.0, -150.0),) and roughness.shown() == roughness
+
+
+@pytest.mark.parametrize("display", [SHOP, Display("imperial"), Display(sign="compression-positive")])
+def test_a_number_whose_unit_stays_keeps_its_text(display):
+    """Only what is converted is written anew."""
+    rows = (("friction", "N", Shown(11.2024, "11 ± 22")), ("bleed", "Hz", Shown(3.14159, "3.1416")))
+    table = Table("t", (Column("quantity"), Column("unit"), Column("value")), rows)
+    with shown_in(display):
+        (_, _, friction), (_, _, bleed) = table.texts()
+        assert bleed == "3.1416" and friction == ("11 ± 22" if display.units == "SI" else "2.5 ± 4.9")
 
 
 def test_sentences_have_the_unit_and_names_in_them_stay():

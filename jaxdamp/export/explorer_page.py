@@ -203,9 +203,9 @@ def _of_car(car: RideProgram) -> Contents:
     """The vehicle with its numbers, metrics and the channels that these need."""
     vehicle = car.vehicle
     channels = [
-        {"name": name, "title": metric_words(name), "unit": vehicle.units[name], "meaning": vehicle.descriptions[name]}
-        | {"signed": display().signed(metric_words(name))}
-        for name in car.needed
+        {"name": name, "title": metric_words(name), "unit": vehicle.units[name], "meaning": display().text(meaning)}
+        | {"signed": display().signed(meaning)}
+        for name, meaning in ((name, vehicle.descriptions[name]) for name in car.needed)
     ]
     about = {
         "title": class_words(vehicle),

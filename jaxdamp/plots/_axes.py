@@ -19,23 +19,27 @@ def label_axis(axes: Axes, name: Literal["x", "y"], label: str, *, turns: bool =
     """The label of one axis, and ticks in the unit and the sign that are shown, by the unit in the label.
 
     `times` brings the numbers drawn to the unit of the label; with `turns` the sign is that of the direction, also if
-    the label does not say so.
+    the label does not say so. The scale of the axes, linear or not, is chosen before.
     """
-    from matplotlib.ticker import FuncFormatter
+    from matplotlib.ticker import FuncFormatter, NullFormatter
 
     axis = axes.xaxis if name == "x" else axes.yaxis
     wrap(axis.set_label_text(display().text(label)), axes)
     found = re.search(r"\[([^\[\]]+)\]", label)
-    shown = display().of(found[1] if found else "", signed=turns or "+" in display().text(label))
+    shown = display().of(found[1] if found else "", signed=turns or display().signed(label))
     factor = times * shown.factor
-    if factor == 1.0 or axis.get_scale() != "linear":
+    if factor == 1.0:
         return
-    from jaxdamp.plots._ticks import TicksInUnit
+    from jaxdamp.plots._ticks import LogTicksInUnit, TicksInUnit
 
-    ticks = TicksInUnit(factor)
+    log = axis.get_scale() == "log"
+    ticks = LogTicksInUnit(factor) if log else TicksInUnit(factor)
     axis.set_major_locator(ticks)
     axis.set_major_formatter(FuncFormatter(ticks.text))
-    if factor < 0.0:
+    if log:
+        axis.set_minor_locator(LogTicksInUnit(factor, range(2, 10)))
+        axis.set_minor_formatter(NullFormatter())
+    elif factor < 0.0:
         axis.set_inverted(True)
         change = f"{name}lim_changed"
         axes.callbacks.connect(change, lambda _: None if axis.get_inverted() else axis.set_inverted(True))

@@ -7,7 +7,7 @@ from itertools import groupby
 import numpy as np
 
 from jaxdamp._display import display
-from jaxdamp._tables import percent_change, typeset_unit
+from jaxdamp._tables import typeset_unit
 from jaxdamp._types import Axes
 from jaxdamp.plots import _axes, _rides, _sheet, _style, fitted_range
 from jaxdamp.plots.damping import ratios, wheel_axis
@@ -202,7 +202,7 @@ def bars(axes: Axes, shown: _rides.Rides) -> None:
     """The main metrics: change with whiskers over unseen roads and marks at limits, or their values for one ride."""
     names = _main_metrics(shown)
     if shown.single:
-        rows = [(_style.metric_words(n), _style.quantity(shown.values[1][n], shown.units[n])) for n in names]
+        rows = [(_style.metric_words(n), _style.quantity(shown.values[1][n], shown.units[n], n)) for n in names]
         _sheet.table(axes, "The main numbers", ["", ""], rows, [1.0], step=0.1)
         return
     for row, name in enumerate(names):
@@ -218,20 +218,22 @@ def bars(axes: Axes, shown: _rides.Rides) -> None:
 
 
 def _bar(axes: Axes, shown: _rides.Rides, row: int, name: str) -> None:
-    """The change of one metric."""
-    before, after = (side[name] for side in shown.values)
-    change = percent_change(before, after) or 0.0
+    """The change of one metric; of one without a change in percent only the values."""
+    values = " → ".join(_style.quantity(side[name], shown.units[name], name) for side in shown.values)
+    change = shown.change(name, shown.values[1][name])
+    percent = "" if change is None else f", {_style.percent(change)}"
+    text = f"{_style.metric_words(name)}:  {values}{percent}"
+    axes.text(0.01, row - 0.3, text, transform=axes.get_yaxis_transform(), zorder=5, **_NOTE)
+    if change is None:
+        return
     axes.barh(row + 0.1, change, 0.4, color=_style.GOOD if change < 0.0 else _style.COLOURS[1], zorder=2)
     if shown.fresh is not None and np.all(np.isfinite(shown.fresh.change(name))):
         spread = 100.0 * shown.fresh.change(name)
         axes.plot([spread.min(), spread.max()], [row + 0.1] * 2, "|-", color=_style.BLACK, linewidth=1.2, zorder=3)
         axes.plot(spread.mean(), row + 0.1, "D", color=_style.BLACK, markersize=3.5, zorder=3)
-    ends = [percent_change(before, end) for end in shown.limits.get(name, ()) if np.isfinite(end)]
+    ends = [shown.change(name, end) for end in shown.limits.get(name, ()) if np.isfinite(end)]
     for end in (end for end in ends if end is not None):
         axes.plot([end, end], [row - 0.15, row + 0.35], color=_style.BAD, linewidth=2.0, zorder=4)
-    values = " → ".join(_style.quantity(value, shown.units[name]) for value in (before, after))
-    text = f"{_style.metric_words(name)}:  {values}, {_style.percent(change)}"
-    axes.text(0.01, row - 0.3, text, transform=axes.get_yaxis_transform(), zorder=5, **_NOTE)
 
 
 def damper(panels: Sequence[Axes], shown: _rides.Rides, path: str) -> None:

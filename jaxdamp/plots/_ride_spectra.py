@@ -42,9 +42,9 @@ def gains(axes: Sequence[Axes], shown: _rides.Rides) -> None:
         for label, style, by_channel in sides:
             panel.loglog(*by_channel[channel], label=label, **style)
         unit = f"[{typeset_unit(shown.cars[0].units[channel])}/mm]" if channel != channels[0] else "[–]"
-        _style.dress(panel, "frequency [Hz]", unit, title)
         _style.plain_log_axis(panel.xaxis)
         _style.plain_log_axis(panel.yaxis)
+        _style.dress(panel, "frequency [Hz]", unit, title)
         panel.set_xlim(LOWEST, HIGHEST)
         _bands(panel, shown.frequencies)
     axes[0].axhline(1.0, color="0.6", linewidth=0.8, zorder=1)
@@ -144,25 +144,21 @@ def _densities(shown: _rides.Rides, channel: str) -> list[tuple[np.ndarray, np.n
 def event(axes: Axes, shown: _rides.Rides) -> None:
     """The motion of the body over a bump, with its peaks, overshoot and settling time."""
     assert shown.responses is not None
-    channel = next((n for n in ("sprung_displacement", "chassis_displacement") if n in shown.responses[0].units), "")
-    channel = channel or default_channels(shown.cars[0].layout)[0]
-    factor = _MM if shown.responses[0].units[channel] == "m" else 1.0
-    unit = "mm" if factor == _MM else typeset_unit(shown.responses[0].units[channel])
     for label, style, number in shown.styles():
         response = shown.responses[number]
-        time, values = np.asarray(response.time), factor * np.asarray(response[channel])
+        height = np.asarray(response[f"z_{response.vehicle.frame().main_body.name}"])
+        time, values = np.asarray(response.time), _MM * (height - height[0])
         moved = np.abs(np.asarray(response.road_rate)).max(axis=1)
         end = float(time[np.flatnonzero(moved > 1e-3 * moved.max())[-1]])
         after = values[time > end]
-        over = f", {_style.short(float(np.abs(after).max()))} {unit} after it" if after.size else ""
+        over = f", {_style.quantity(float(np.abs(after).max()), 'mm')} after it" if after.size else ""
         last = float(time[np.flatnonzero(np.abs(values) > SETTLED * np.abs(values).max())[-1]])
         settled = (
             "not settled" if last > 0.99 * time[-1] else f"settled {_style.short(max(last - end, 0.0))} s after it"
         )
-        words = f"up {_style.short(values.max())} {unit}, down {_style.short(values.min())} {unit}{over}, {settled}"
+        up, down = (_style.quantity(float(peak), "mm") for peak in (values.max(), values.min()))
+        words = f"up {up}, down {down}{over}, {settled}"
         axes.plot(time, values, label=f"{label}: {words}" if label else words, **style)
-    _style.dress(
-        axes, "time [s]", f"[{unit}]   (+ up)", f"{_style.first_upper(_style.metric_words(channel))} over the bump"
-    )
+    _style.dress(axes, "time [s]", "[mm]   (+ up)", "Height of the body over the bump")
     _style.cross(axes, vertical=False)
     axes.legend(frameon=False, loc="best")

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._tables import percent_change
 from jaxdamp.control import laws_at_levels
 from jaxdamp.dampers import AbstractDamper, Linear, takes_command, without_fitted_ranges
 from jaxdamp.parameters import get
@@ -19,7 +20,7 @@ from jaxdamp.plots import _style
 from jaxdamp.rig import quasi_static
 from jaxdamp.roads import AbstractRoad, WhiteRoad, from_profile
 from jaxdamp.simulation import Response, Ride, simulate
-from jaxdamp.tune import Limits, Rescore, Run, TuneResult, damper_paths, limit_spans
+from jaxdamp.tune import Limits, Rescore, Run, TuneResult, change_in_percent, damper_paths, limit_spans
 from jaxdamp.vehicles import AbstractVehicle, CriticalDamping, critical_damping, equivalent_dampers, modes
 
 
@@ -111,6 +112,13 @@ class Rides:
             return False
         rate = np.abs(np.asarray(self.responses[0].road_rate)[:, 0])
         return float(np.mean(rate > 1e-3 * rate.max())) < _EVENT if rate.max() > 0.0 else True
+
+    def change(self, name: str, after: float) -> float | None:
+        """The change of a metric [%]; none where the tables have none: from zero, and of one that may be negative."""
+        before, known = self.values[0][name], self.cars[0].ride_metrics
+        if self.tuning is not None:
+            return change_in_percent(self.tuning, name, before, after)
+        return None if any(m.name == name and m.statistic.signed for m in known) else percent_change(before, after)
 
     @property
     def passive(self) -> tuple[AbstractVehicle, AbstractVehicle]:
@@ -210,7 +218,7 @@ def quadrants(velocity: np.ndarray | None) -> str:
     low, high = np.abs(velocity) <= border, np.abs(velocity) > border
     shares = [100.0 * np.mean(side & speed) for side in (velocity > 0, velocity < 0) for speed in (low, high)]
     rebound, compression = (f"{a:.0f} % slow, {b:.0f} % fast" for a, b in (shares[:2], shares[2:]))
-    return f"Rebound {rebound} (> {_style.short(1e3 * border)} mm/s)\ncompression {compression}"
+    return f"Rebound {rebound} (> {_style.quantity(1e3 * border, 'mm/s')})\ncompression {compression}"
 
 
 def dips(shown: Rides) -> str:

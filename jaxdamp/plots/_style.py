@@ -137,14 +137,16 @@ def short(value: float) -> str:
     return "0" if value == 0.0 else text.replace("-", "−")
 
 
-def quantity(value: float, unit: str) -> str:
+def quantity(value: float, unit: str, name: str = "") -> str:
     """A number with its unit for people, in the units that are shown: strokes in mm, rates of springs in N/mm.
+
+    The name of a metric or a measured quantity, if given, decides whether the sign is that of the direction.
 
     >>> quantity(0.0745, "m"), quantity(60e3, "N/m"), quantity(1.25, "m/s^2"), quantity(3.0, "")
     ('74.5 mm', '60 N/mm', '1.25 m/s²', '3')
     """
     factor, unit = {"m": (1e3, "mm"), "N/m": (1e-3, "N/mm")}.get(unit, (1.0, unit))
-    shown = display().of(unit)
+    shown = display().of(unit, signed=display().signed(name))
     return f"{short(shown(factor * value))} {typeset_unit(shown.unit)}".rstrip()
 
 

@@ -4,7 +4,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator
+
+from jaxdamp.plots._style import short
 
 
 class TicksInUnit(MaxNLocator):
@@ -22,6 +24,22 @@ class TicksInUnit(MaxNLocator):
     def text(self, value: float, _: int | None) -> str:
         """The label of a tick."""
         return f"{round(self._factor * value, 9) + 0.0:g}".replace("-", "−")
+
+
+class LogTicksInUnit(LogLocator):
+    """1, 2 and 5 of each decade of another unit than the one that is drawn, or other multiples of its powers of ten."""
+
+    def __init__(self, factor: float, subs: Sequence[float] = (1.0, 2.0, 5.0)) -> None:
+        super().__init__(subs=subs, numticks=30)
+        self._factor = abs(factor)
+
+    def tick_values(self, vmin: float, vmax: float) -> Sequence[float]:
+        """Where ticks are, in the unit that is drawn."""
+        return [tick / self._factor for tick in super().tick_values(self._factor * vmin, self._factor * vmax)]
+
+    def text(self, value: float, _: int | None) -> str:
+        """The label of a tick."""
+        return short(self._factor * value)
 
 
 class FewTicks(MaxNLocator):

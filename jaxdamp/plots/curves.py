@@ -85,7 +85,8 @@ def force_velocity(
     _style.cross(axes)
     axes.set_xlim(float(points.min()), float(points.max()))
     _name(axes, measured, curves, shaded)
-    without = f"The measured points are drawn without the static force of {static_force:.0f} N: gas or zero error."
+    force = _style.quantity(static_force, "N", "static force")
+    without = f"The measured points are drawn without the static force of {force}: gas or zero error."
     remarks = [note, without if runs and static_force else "", *gaps]
     _style.note_below(figure, [remark for remark in remarks if remark])
     return figure

@@ -71,11 +71,6 @@ class _Damper:
     def largest(self) -> float:
         return max(float(np.abs(run.force - self.static_of(run)).max()) for run in self.runs)
 
-    @property
-    def static_force(self) -> float:
-        """The mean of those of the settings [N]."""
-        return float(np.mean(list(self.static.values())))
-
     def static_of(self, run: BenchRun) -> float:
         """The static force [N] of the setting of a record."""
         return next(self.static[name] for name, runs in self.evaluation.settings.items() if run in runs)
@@ -164,7 +159,7 @@ def _force_velocity(
         ends = {"color": _style.AFTER["color"], "alpha": 0.25, "linewidth": 0.0, "label": "95 % band of the law"}
         axes.fill_between(_MM * np.asarray(band.velocity), band.lower, band.upper, **ends)
     if limits is not None:
-        _tolerances(axes, limits, damper.static_force)
+        _tolerances(axes, limits, damper.static)
     _style.dress(axes, "velocity [mm/s]", "force [N]", _force_title(damper), turns="xy")
     _style.cross(axes)
     axes.set_xlim(-1.05 * reach, 1.05 * reach)
@@ -196,12 +191,15 @@ def _records(axes: Axes, damper: _Damper) -> list:
 
 
 def _force_title(damper: _Damper) -> str:
-    """What the picture shows and what was taken off."""
-    least, most = (_style.short(end(damper.static.values())) for end in (min, max))
+    """What the picture shows, what was taken off, and what the measured forces have more than the law."""
+    shown = display().of("N", signed=True)
+    least, most = (_style.short(end(map(shown, damper.static.values()))) for end in (min, max))
     span = least if least == most else f"{least} to {most}"
     seen = max(map(abs, damper.static.values())) > _SEEN * damper.largest
-    off = f", without the static force of {span} N" if seen else ""
-    return f"Force over velocity{off}"
+    off = f", without the static force of {span} {shown.unit}" if seen else ""
+    friction = 0.0 if damper.fit is None or damper.fit.rig is None else float(damper.fit.rig.friction)
+    on = f", measured with the machine's friction of {_style.quantity(friction, 'N')}" if friction else ""
+    return f"Force over velocity{off}{on}"
 
 
 def _curve(axes: Axes, law: AbstractDamper, reach: float, label: str, style: Mapping) -> None:
@@ -213,11 +211,13 @@ def _curve(axes: Axes, law: AbstractDamper, reach: float, label: str, style: Map
             line.set_xdata(_MM * points)
 
 
-def _tolerances(axes: Axes, limits: LimitCheck, static: float) -> None:
+def _tolerances(axes: Axes, limits: LimitCheck, static: Mapping[str, float]) -> None:
     """Bars from the least to the largest force at stated velocities, red where the measured force is outside."""
-    for at, ends, passed in limit_bars(limits):
-        colour, place = _style.GOOD if passed else _style.BAD, [_MM * at] * 2
-        axes.plot(place, [end - static for end in ends], color=colour, linewidth=6.0, alpha=0.6, zorder=1.0)
+    look: _style.Look = {"linewidth": 6.0, "alpha": 0.6, "zorder": 1.0, "solid_capstyle": "butt"}
+    alike = next(iter(static.values()))  # of a fit, whose records may be evaluated without their settings
+    for setting, at, ends, passed in limit_bars(limits):
+        forces = [end - static.get(setting, alike) for end in ends]
+        axes.plot([_MM * at] * 2, forces, color=_style.GOOD if passed else _style.BAD, **look)
 
 
 def _forces(axes: Axes, damper: _Damper) -> None:

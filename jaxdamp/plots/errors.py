@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from jaxdamp._display import display
 from jaxdamp._types import Axes, Figure
 from jaxdamp.bench import white_noise
 from jaxdamp.identify import (
@@ -40,10 +41,10 @@ def ladder(comparison: Comparison | VehicleComparison) -> Figure:
         scores = [np.nan if r.held_out_rmse is None else r.held_out_rmse for r in rungs]
         label = "held-out records" if comparison.held_out else "motion held out"
         groups.append((label, scores, 0.5 * thickness, _style.COLOURS[1]))
-    handles = []
+    handles, shown = [], display().of("N" if isinstance(comparison, Comparison) else "")
     for label, values, shift, colour in groups:
         bars = axes.barh(rows + shift, values, thickness, color=colour, label=label)
-        axes.bar_label(bars, fmt=_style.short, padding=3, fontsize="small")
+        axes.bar_label(bars, fmt=lambda value: _style.short(shown(value)), padding=3, fontsize="small")
         handles.append(bars)
     if isinstance(comparison, VehicleComparison):
         title = f"{_style.in_words(comparison.best.name)}: held-out fit {comparison.best.held_out_fit_percent:.1f} %"
@@ -68,14 +69,14 @@ def _dress_in_newtons(axes: Axes, comparison: Comparison) -> "Line2D":
     runs, best = comparison.best.result.runs, comparison.best
     largest = max(float(np.abs(run.force).max()) for run in runs)
     noise = float(np.sqrt(np.mean([white_noise(run.force) ** 2 for run in runs])))
-    share = f"{_style.short(best.error)} N = {_style.short(100.0 * best.error / largest)} % of the largest force"
+    share = f"{_style.quantity(best.error, 'N')} = {_style.short(100.0 * best.error / largest)} % of the largest force"
     title = f"{_style.in_words(best.name)}: {share}"
     _style.dress(axes, "RMSE of the force [N]   (free parameters in brackets)", "", title)
     factor = 100.0 / largest
     to_percent, back = functools.partial(np.multiply, factor), functools.partial(np.multiply, 1.0 / factor)
     shares = axes.secondary_xaxis("top", functions=(to_percent, back))
     shares.set_xlabel("% of the largest force")
-    label = f"noise of the force, {_style.short(noise)} N"
+    label = f"noise of the force, {_style.quantity(noise, 'N')}"
     return axes.axvline(noise, color=_style.BLACK, linestyle=":", linewidth=1.2, label=label)
 
 
@@ -126,9 +127,8 @@ def experiment(design: ExperimentDesign) -> Figure:
         handles += left.plot(reach[:, 0], reach[:, 1], "os"[number], markersize=7 - 2 * number, label=label, **style)
         errors = 100.0 * np.sqrt(np.diag(covariance)) / np.where(values > 0, values, np.nan)
         right.barh(rows + 0.4 * number, errors, height=0.36, **style)
+    left.set(xscale="log", yscale="log")
     _style.dress(left, "stroke, zero to peak [mm]", "peak velocity [m/s]", "Tests")
-    left.set_xscale("log")
-    left.set_yscale("log")
     _style.dress(right, "expected standard error [% of the value]", "", "Parameters")
     right.set_xscale("log")
     right.set_yticks(rows + 0.2 * (len(sets) - 1), design.free.names)

@@ -1,13 +1,12 @@
 """Records without a law: as they are, mean loops, forces over velocity with limits and a baseline, gas and friction."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp._display import display, rounded
+from jaxdamp._display import display, plus_minus
 from jaxdamp._types import Axes, Figure
 from jaxdamp.bench import (
     BenchRun,
@@ -20,7 +19,7 @@ from jaxdamp.bench import (
     last_steady_cycle,
 )
 from jaxdamp.plots import _axes, _style
-from jaxdamp.plots.loops import spread
+from jaxdamp.plots.loops import spread, with_speed
 
 
 def records(runs: BenchRun | Iterable[BenchRun], *, most: int = 12) -> Figure:
@@ -46,8 +45,7 @@ def records(runs: BenchRun | Iterable[BenchRun], *, most: int = 12) -> Figure:
         panels["v"].plot(run.velocity[part], run.force[part], **look)
         panels["x"].plot(1e3 * run.stroke[part], run.force[part], **look)
         panels["stroke"].plot(run.time - run.time[0], 1e3 * run.stroke, **look)
-        label = f"{run.name} ({run.peak_velocity:.2g} m/s)"
-        handles += panels["force"].plot(run.time - run.time[0], run.force, label=label, **look)
+        handles += panels["force"].plot(run.time - run.time[0], run.force, label=with_speed(run), **look)
     _style.dress(panels["v"], _style.VELOCITY, _style.FORCE, "Last full cycle: force over velocity")
     _style.dress(panels["x"], _style.STROKE, _style.FORCE, "Force over stroke")
     _style.dress(panels["stroke"], "", "stroke [mm]\n(+ rebound)", "Whole records")
@@ -144,17 +142,15 @@ def both_directions(axes: Axes, found: GasAndFriction) -> None:
 def gas_and_friction_words(found: GasAndFriction, between: str = ", ") -> str:
     """Static force at mid-stroke in the sign that is shown, its rate and the friction, with their uncertainties."""
     values = {m.quantity: m for m in found.measurements}
-    if display().of("", signed=True).factor < 0.0:
-        values["gas force"] = replace(values["gas force"], value=-values["gas force"].value)
     gas, friction = (_with_uncertainty(values[name]) for name in ("gas force", "friction"))
-    return f"Static {gas} N, {_style.short(1e-3 * found.gas_rate)} N/mm{between}friction {friction} N"
+    return f"Static {gas}, {_style.quantity(found.gas_rate, 'N/m')}{between}friction {friction}"
 
 
 def _with_uncertainty(measurement: Measurement) -> str:
-    """A measured value, and its uncertainty where it is known."""
-    if not measurement.uncertainty:
-        return _style.short(measurement.value)
-    return " ± ".join(rounded(measurement.value, measurement.uncertainty)).replace("-", "−")
+    """A measured value, and its uncertainty where it is known, in the unit and the sign that are shown."""
+    shown = display().of(measurement.unit, signed=display().signed(measurement.quantity))
+    value, error = shown(measurement.value), abs(shown(measurement.uncertainty or 0.0))
+    return f"{plus_minus(value, error).replace('-', '−') if error else _style.short(value)} {shown.unit}"
 
 
 def _colours(evaluation: Evaluation) -> tuple[_style.Look, list[tuple[str, tuple[float, float, float, float]]]]:
@@ -167,7 +163,7 @@ def _colours(evaluation: Evaluation) -> tuple[_style.Look, list[tuple[str, tuple
     order = sorted(evaluation.runs, key=lambda run: run.peak_velocity)
     colours = {run.name: _style.graded(i, len(order)) for i, run in enumerate(order)}
     shown = order if len(order) <= _MOST_LABELLED else [order[0], order[-1]]
-    return colours, [(f"{run.name} ({run.peak_velocity:.2g} m/s)", colours[run.name]) for run in shown]
+    return colours, [(with_speed(run), colours[run.name]) for run in shown]
 
 
 def _draw_cycle(panels: Mapping[str, Axes], cycles: FoldedCycles, style: _style.Look) -> None:
@@ -236,13 +232,13 @@ def _branch(evaluation: Evaluation, setting: str, side: str) -> tuple[np.ndarray
     return velocity, force
 
 
-def limit_bars(limits: LimitCheck) -> Iterator[tuple[float, list[float], bool]]:
-    """Velocity [m/s], least and largest force, and whether they are kept, of limits at stated velocities."""
+def limit_bars(limits: LimitCheck) -> Iterator[tuple[str, float, list[float], bool]]:
+    """Setting, velocity [m/s], least and largest force, and whether they are kept, of limits at stated velocities."""
     for limit, measured in limits.results:
         if limit.velocity is not None and measured is not None and measured.unit == "N":
             ends = [measured.value if end is None else end for end in (limit.minimum, limit.maximum)]
             side = 1.0 if limit.quantity.startswith("rebound") else -1.0
-            yield side * limit.velocity, ends, limit.kept_by(measured.value)
+            yield measured.setting, side * limit.velocity, ends, limit.kept_by(measured.value)
 
 
 def _draw_limits(axes: Axes, limits: LimitCheck) -> list:
@@ -251,7 +247,7 @@ def _draw_limits(axes: Axes, limits: LimitCheck) -> list:
 
     colours = {True: _style.GOOD, False: _style.BAD}
     seen = set()
-    for at, ends, passed in limit_bars(limits):
+    for _, at, ends, passed in limit_bars(limits):
         axes.plot([at, at], ends, color=colours[passed], linewidth=7.0, alpha=0.45, solid_capstyle="butt")
         seen.add(passed)
     words = {True: "limits, kept", False: "limits, not kept"}

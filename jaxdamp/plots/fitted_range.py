@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float
 
+from jaxdamp._display import display
 from jaxdamp._types import Axes, Figure
 from jaxdamp.dampers import AbstractDamper, extrapolated
 from jaxdamp.plots import _style
@@ -73,7 +74,7 @@ def _law_of(response: Response, channel: str) -> AbstractDamper | None:
 def footnotes(figure: Figure, responses: Mapping[str, Response]) -> None:
     """Footnotes on the dampers used outside the range of their records, and by how much."""
     lines = [
-        f"{name + ': ' if name else ''}{text}"
+        display().words(f"{name + ': ' if name else ''}{text}")
         for name, response in responses.items()
         for text in range_sentences(response.range_use())
     ]

@@ -7,11 +7,11 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._display import display
-from jaxdamp._tables import typeset_unit
 from jaxdamp._types import Figure
 from jaxdamp.bench import BenchRun, as_runs, last_steady_cycle
 from jaxdamp.identify import Comparison, FitResult, VehicleFit
 from jaxdamp.plots import _axes, _style
+from jaxdamp.plots.rides import unit_and_sign
 
 
 _MOST_POINTS, _PHASES = 300, 40  # of a residual over the velocity, and over the cycle
@@ -60,7 +60,7 @@ def fit_loops(result: FitResult, runs: BenchRun | Sequence[BenchRun] | None = No
         size = max((len(part) - 1) // _PHASES, 1)
         phase = _block_means((run.time[part[:-1]] - run.time[part[0]]) * run.frequency, size)
         over_time.plot(phase, _block_means(residual[:-1], size), color=colour, linewidth=1.3)
-        handles.append(Line2D([], [], color=colour, linewidth=2.0, label=f"{run.name} ({run.peak_velocity:.2g} m/s)"))
+        handles.append(Line2D([], [], color=colour, linewidth=2.0, label=with_speed(run)))
     label = "fitted − measured [N]"
     _style.dress(loops, _style.VELOCITY, _style.FORCE, "Force over velocity")
     _style.dress(football, _style.STROKE, _style.FORCE, "Force over stroke")
@@ -81,7 +81,6 @@ def fit_loops(result: FitResult, runs: BenchRun | Sequence[BenchRun] | None = No
     return figure
 
 
-_SIGNS = {"sprung_acceleration": "up", "stroke": "rebound"}  # of channels, by the end of their names
 _MOST_LAWS = 12  # of small multiples
 
 
@@ -112,7 +111,8 @@ def loops_by_law(comparison: Comparison, record: str | None = None) -> Figure:
         axes.plot(run.velocity[part], run.force[part], label="measured", **(_style.REFERENCE | {"linewidth": 3.0}))
         axes.plot(run.velocity[part], force[part], label="law", **_style.AFTER)
         best = ", recommended" * (rung is comparison.best)
-        words = f"{_style.in_words(rung.name)}: {_style.short(rung.error)}\N{NO-BREAK SPACE}N{best}"
+        error = _style.quantity(rung.error, "N").replace(" ", "\N{NO-BREAK SPACE}")
+        words = f"{_style.in_words(rung.name)}: {error}{best}"
         _style.dress(axes, _style.VELOCITY, "force [N]", words, turns="y")
         _style.cross(axes)
         _axes.few_ticks(axes, 4)
@@ -134,7 +134,7 @@ def _title(result: FitResult, runs: Sequence[BenchRun], shown: Sequence[BenchRun
     percent, rmse = (result.fit_percent, result.rmse) if own else result.score(runs)[:2]
     new = not any(run is fitted for run in runs for fitted in result.runs)
     records = f"{runs[0].name if len(runs) == 1 else f'{len(runs)} records'}{' not fitted' * new}"
-    score = f"{_style.law_name(result.law)}: fit {percent:.1f} %, RMSE {_style.short(rmse)} N on {records}"
+    score = f"{_style.law_name(result.law)}: fit {percent:.1f} %, RMSE {_style.quantity(rmse, 'N')} on {records}"
     return display().words(score) + (
         f"\n{len(shown)} of them shown, last full cycle of each" if len(shown) < len(runs) else ""
     )
@@ -143,6 +143,11 @@ def _title(result: FitResult, runs: Sequence[BenchRun], shown: Sequence[BenchRun
 def _block_means(values: Float[np.ndarray, " samples"], size: int) -> Float[np.ndarray, " blocks"]:
     """Means of successive samples, the remainder left out."""
     return values[: len(values) // size * size].reshape(-1, size).mean(axis=1)
+
+
+def with_speed(run: BenchRun) -> str:
+    """The name of a record with its peak velocity, for a legend."""
+    return f"{run.name} ({_style.quantity(run.peak_velocity, 'm/s')})"
 
 
 def closed_cycle(run: BenchRun) -> np.ndarray:
@@ -185,16 +190,15 @@ def vehicle_fit(result: VehicleFit, record: str | None = None) -> Figure:
     figure = _style.new_figure(12.0, 1.0 + 2.2 * len(scores))
     rows = figure.subplots(len(scores), 2, sharex=True, squeeze=False, width_ratios=(2.0, 1.0))
     for (over, residual), score in zip(rows, scores, strict=True):
-        factor, unit = (1e3, "mm") if score.unit == "m" else (1.0, typeset_unit(score.unit))
+        factor, label = 1e3 if score.unit == "m" else 1.0, unit_and_sign(result.vehicle.layout, score.channel)
         measured, computed = (factor * np.asarray(one[score.channel]) for one in (shown, fitted))
         over.plot(shown.time, measured, color=_style.GREY, linewidth=2.5, alpha=0.5, label="measured")
         over.plot(shown.time, computed, color=_style.COLOURS[0], linewidth=0.9, label="fitted")
         residual.plot(shown.time, computed - measured, color=_style.COLOURS[1], linewidth=0.6)
-        sign = next((f"   (+ {side})" for end, side in _SIGNS.items() if score.channel.endswith(end)), "")
         words = _style.first_upper(_style.metric_words(score.channel))
-        _style.dress(over, "", f"[{unit}]{sign}", f"{words}, fit {_style.short(score.fit_percent)} %")
+        _style.dress(over, "", label, f"{words}, fit {_style.short(score.fit_percent)} %")
         error = f"fitted − measured, RMS {_style.quantity(score.rmse, score.unit)}"
-        _style.dress(residual, "", f"[{unit}]", error)
+        _style.dress(residual, "", label.split("  ")[0], error, turns="y" if display().signed(label) else "")
     for axes in rows[-1]:
         axes.set_xlabel("time [s]")
     _style.legend_above(figure, rows[0, 0].get_lines())

@@ -3,6 +3,7 @@
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._display import display
 from jaxdamp._types import Figure
 from jaxdamp.bench import Finding, Preflight
 from jaxdamp.plots import _style
@@ -63,4 +64,5 @@ def _size(finding: Finding) -> str:
         size, unit = 100.0 * size, "%"
     for large, small in (("s", "ms"), ("m", "mm")):
         size, unit = (1e3 * size, small) if unit == large and abs(size) < 0.1 else (size, unit)
-    return f"{sign}  {_style.short(size)} {unit}"
+    shown = display().of(unit, signed=display().signed(finding.name))
+    return f"{sign}  {_style.short(shown(size))} {shown.unit}"

@@ -1,5 +1,6 @@
 """Rides: time histories, the spectrum of the body acceleration, and the use of the damper."""
 
+import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -16,10 +17,11 @@ from jaxdamp.vehicles import ChannelKind, Layout
 
 
 WINDOW = 3.0  # s, drawn over time: in more, wheel oscillations at 10 Hz cannot be distinguished
-_WORDS = {
-    "sprung_acceleration": "body acceleration [m/s²]   (+ up)",
-    "stroke": _style.STROKE,
-    "dynamic_tyre_load": "dynamic tyre load [N]   (+ more load)",
+_SIGNS = dict.fromkeys((ChannelKind.HEIGHT, ChannelKind.VELOCITY, ChannelKind.ACCELERATION), "+ up") | {
+    ChannelKind.STROKE: "+ rebound",
+    ChannelKind.DAMPER_VELOCITY: "+ rebound",
+    ChannelKind.FORCE: "+ resists extension",
+    ChannelKind.TYRE_LOAD: "+ more load",
 }
 
 
@@ -88,13 +90,14 @@ def ride(
         handles += spectrum.loglog(frequency, density, label=label, **style)
     for axes, channel in zip(rows, channels, strict=True):
         fitted_range.shade_channel(axes, responses.values(), channel)
-        _style.dress(axes, "", _label(first, channel).replace("   ", "\n"))
+        words = re.sub(r"^sprung_", "body_", channel).replace("_", " ")
+        _style.dress(axes, "", f"{words} {unit_and_sign(first.system.layout, channel)}".replace("   ", "\n"))
         _style.cross(axes, vertical=False)
         axes.label_outer()
     figure.align_ylabels(rows)
     rows[-1].set_xlabel("time [s]")
     rows[0].set_xlim(start, stop)
-    name = _label(first, channels[0]).split(" [")[0]
+    name = re.sub(r"^sprung_", "body_", channels[0]).replace("_", " ")
     _style.dress(spectrum, "frequency [Hz]", f"power spectral density [({unit})²/Hz]", f"Spectrum of the {name}")
     _style.plain_log_axis(spectrum.xaxis)
     spectrum.set_xlim(*frequencies)
@@ -160,10 +163,11 @@ def _factor(response: Response, channel: str) -> float:
     return 1e3 if response.units[channel] == "m" else 1.0
 
 
-def _label(response: Response, channel: str) -> str:
-    words = _WORDS.get(channel)
-    unit = "mm" if response.units[channel] == "m" else _unit(response, channel)
-    return words or f"{channel.replace('_', ' ')} [{unit}]"
+def unit_and_sign(layout: Layout, channel: str) -> str:
+    """The unit that a channel is drawn in and the direction in which it is positive, as a label has them."""
+    kind = layout.by_name[channel].kind
+    unit = "mm" if kind.unit == "m" else typeset_unit(kind.unit, "–")
+    return f"[{unit}]" + (f"   ({_SIGNS[kind]})" if kind in _SIGNS else "")
 
 
 _BINS, _POINTS, _SHADE_POINTS = 41, 81, 2001
@@ -213,7 +217,8 @@ def damper_use(responses: Response | Mapping[str, Response], *, damper: str | No
     words = f"{_style.first_upper(damper.replace('_', ' '))}: law (thick) and its forces in the ride (thin)"
     _style.dress(trace, _style.VELOCITY, _style.FORCE, words)
     _style.cross(trace)
-    _style.dress(time_share, _style.VELOCITY, "share of time [%]", f"Time, {reach / _BINS * 2:.2g} m/s a step")
+    step = _style.quantity(2.0 * reach / _BINS, "m/s")
+    _style.dress(time_share, _style.VELOCITY, "share of time [%]", f"Time, {step} a step")
     _style.dress(energy_share, _style.VELOCITY, "share of dissipated energy [%]", "Energy")
     if len(responses) > 1 or shaded[0]:
         _style.legend_above(figure, handles)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._display import Shown, display
 from jaxdamp._tables import typeset_unit
 from jaxdamp._types import Artist, Axes, Dataset, Figure
 from jaxdamp.plots import _axes, _style
@@ -82,7 +83,7 @@ def sweep(
     """
     fixed = ""
     if over is None and (alone := _of_one_value(data, metric)):
-        fixed = f", {', '.join(f'{_words(data, n)} {_style.short(data[n].item())}{_unit(data, n)}' for n in alone)}"
+        fixed = f", {', '.join(f'{_words(data, n)} {_value(data, n, data[n].item())}' for n in alone)}"
         data = data.squeeze(alone)
     axes = _grid_axes(data, metric)
     chosen, others = _chosen_axes(data, metric, axes, over)
@@ -148,7 +149,7 @@ def _curves(shown: _Shown, name: str, others: list[str]) -> None:
     failed = data["failed"].transpose(*others, name).values.reshape(lines.shape)
     where = data[name].values
     for number, (line, value) in enumerate(zip(lines, data[others[0]].values if others else [None], strict=True)):
-        label = None if value is None else f"{others[0]} = {_style.short(float(value))}{_unit(data, others[0])}"
+        label = None if value is None else f"{others[0]} = {_value(data, others[0], float(value))}"
         plot.plot(where, line, marker="o", markersize=3.0, label=label, **_style.line_style(number))
     _style.dress(plot, _label(data, name), _label(data, metric))
     if others:
@@ -192,7 +193,8 @@ def _map(drawn: _Shown, over: list[str]) -> None:
             row, column = np.unravel_index(np.ma.argmin(allowed), shown.shape)
             smallest = float(values[row, column])
             edge = any(at in (0, size - 1) and size > 2 for at, size in zip((row, column), shown.shape, strict=True))
-            label = f"smallest{' within the limits' * bool(beyond)}: {_style.short(smallest)}{_unit(data, metric)}"
+            word = "largest" if _turned(data, metric) else "smallest"
+            label = f"{word}{' within the limits' * bool(beyond)}: {_value(data, metric, smallest)}"
             label += ", at the edge: widen the grid" * edge
             _more_than(plot, x, y, shown, smallest)
             plot.plot(x[column], y[row], label=label, **BEST)
@@ -222,7 +224,7 @@ def _mark_present(
         return []
     if all(data[name].min() <= present[name] <= data[name].max() for name in over):
         return plot.plot(*place, **PRESENT)
-    where = ", ".join(f"{_style.short(present[name])}{_unit(data, name)}" for name in over)
+    where = ", ".join(_value(data, name, present[name]) for name in over)
     return plot.plot([], [], " ", label=f"present outside the grid: {where}")
 
 
@@ -283,8 +285,8 @@ def _ends(data: Dataset, spans: Mapping[str, tuple[float, float]]) -> list[_End]
     for name, span in spans.items():
         for value, above in zip(span, (False, True), strict=True):
             if np.isfinite(value):
-                side = "above" if above else "below"
-                label = f"{_style.metric_words(name)} {side} {_style.short(value)}{_unit(data, name)}"
+                side = "below" if above is _turned(data, name) else "above"
+                label = f"{_style.metric_words(name)} {side} {_value(data, name, value)}"
                 ends.append(_End(name, value, above, label))
     return ends
 
@@ -316,5 +318,16 @@ def _words(data: Dataset, name: str) -> str:
     return _style.metric_words(name if alike else last)
 
 
-def _unit(data: Dataset, name: str) -> str:
-    return f" {typeset_unit(data[name].attrs.get('units', ''))}".rstrip()
+def _shown(data: Dataset, name: str) -> Shown:
+    return display().of(data[name].attrs.get("units", ""), signed=display().signed(name))
+
+
+def _turned(data: Dataset, name: str) -> bool:
+    """Whether a result is shown with the other sign."""
+    return _shown(data, name).factor < 0.0
+
+
+def _value(data: Dataset, name: str, value: float) -> str:
+    """A value of an axis or a result with its unit, as it is shown."""
+    shown = _shown(data, name)
+    return f"{_style.short(shown(value))} {typeset_unit(shown.unit)}".rstrip()

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._display import display
 from jaxdamp._tables import typeset_unit
 from jaxdamp._traced import equal
 from jaxdamp._types import Artist, Axes, Figure, VectorLike
@@ -47,7 +48,7 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> Figure:
         gaps += _law(figure.add_subplot(beside[place]), name, pair, points)
     verdict = result.verdict
     colour = _style.GOOD if verdict.better else _style.BAD
-    words = f"{verdict.outcome.value}\n{without_answer(result)}"
+    words = f"{verdict.outcome.value}\n{display().words(without_answer(result))}"
     figure.suptitle(words, x=0.01, ha="left", fontsize="medium", color=colour, wrap=True)
     _bars(bars, result)
     _style.note_below(figure, gaps)
@@ -87,20 +88,21 @@ def own_laws(vehicle: AbstractVehicle) -> list[AbstractDamper]:
 
 
 def _bars(axes: Axes, result: TuneResult) -> None:
-    """Relative change of each metric, with its values."""
+    """Relative change of each metric, with its values; of one without a change in percent only the values."""
     names = list(result.before)
     rows = np.arange(len(names), dtype=float)
-    change = [change_in_percent(result, n, result.before[n], result.after[n]) or 0.0 for n in names]
-    colours = [_style.COLOURS[1] if c > 0 else _style.COLOURS[2] for c in change]
-    axes.barh(rows, change, 0.65, color=colours)
+    change = [change_in_percent(result, n, result.before[n], result.after[n]) for n in names]
+    widths = [value or 0.0 for value in change]
+    axes.barh(rows, widths, 0.65, color=[_style.COLOURS[1] if width > 0 else _style.COLOURS[2] for width in widths])
     reached = dict.fromkeys(result.limits, " (limited)") | dict.fromkeys(result.active_limits, " (limit reached)")
     reached |= {n: " (tightened limit reached)" for n in result.active_limits if n in result.tightened}
     reached |= dict.fromkeys(result.violated, " (LIMIT VIOLATED)")
     labels = []
     for name, value in zip(names, change, strict=True):
         mark = " (minimised)" if name == result.metric else reached.get(name, "")
-        values = " → ".join(_style.quantity(side[name], result.units[name]) for side in (result.before, result.after))
-        labels.append(f"{_style.metric_words(name)}{mark}\n{values}  ({_style.percent(value, 1)})")
+        pair = (_style.quantity(side[name], result.units[name], name) for side in (result.before, result.after))
+        percent = "" if value is None else f"  ({_style.percent(value, 1)})"
+        labels.append(f"{_style.metric_words(name)}{mark}\n{' → '.join(pair)}{percent}")
     axes.set_yticks(rows, labels, fontsize="small")
     axes.invert_yaxis()
     axes.margins(x=0.08)

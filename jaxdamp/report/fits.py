@@ -113,7 +113,7 @@ def fit_report(
         report.heading("Records predicted by fits without them")
         report.text(
             f"Each record was left out once and predicted by {best_law} fitted to the others: mean fit"
-            f" {validation.fit_percent(best_law):.1f} %, RMSE {validation.rmse(best_law):.1f} N."
+            f" {validation.fit_percent(best_law):.1f} %, RMSE {validation.rmse(best_law):.4g} N."
         )
         report.table(validation.record_table())
     return report
@@ -133,7 +133,7 @@ def fit_verdict(report: Report, comparison: Comparison, baseline: AbstractDamper
             records = comparison.held_out or best.result.runs
             percent, rmse, _ = dataclasses.replace(best.result, law=baseline, record_laws=()).score(records)
             factor = f", {rmse / best.error:.1f} times that of {best.name}" if best.error else ""
-            others = (f"Baseline on the same records: RMSE {rmse:.1f} N (fit {percent:.1f} %){factor}.",)
+            others = (f"Baseline on the same records: RMSE {rmse:.4g} N (fit {percent:.1f} %){factor}.",)
     return *comparison.verdict, *others
 
 
@@ -241,20 +241,22 @@ def _add_curves(report: Report, comparison: Comparison, baseline: AbstractDamper
     with report.part(f"The band of {best.name} in force_velocity.png"):
         bands |= {best.name: best.result.band(points[::BAND_STEP])} if best.name in laws else {}
     drawn = dict(list(laws.items())[:MOST_CURVES])
-    note = ""
+    notes = []
     if len(laws) > len(drawn):
-        note = f"Not drawn, with larger errors: {', '.join(map(in_words, list(laws)[MOST_CURVES:]))}."
+        notes = [f"Not drawn, with larger errors: {', '.join(map(in_words, list(laws)[MOST_CURVES:]))}."]
     if baseline is not None:
         drawn |= _with_curves(report, {BASELINE: baseline}, points)
     machine, runs = best.result.rig, best.result.runs
     static = 0.0 if machine is None else float(machine.force_offset) + float(machine.gas_force)
+    if machine is not None and (friction := float(machine.friction)):
+        notes += [f"The measured points hold the friction of the machine, {friction:.4g} N, the laws do not."]
     without_force = None if machine is None else dataclasses.replace(machine, force_offset=0.0, gas_force=0.0)
     report.picture(
         lambda: plots.force_velocity(
             drawn,
             runs=without_machine(without_force, runs),
             baseline=BASELINE if BASELINE in drawn else None,
-            note=note,
+            note=" ".join(notes),
             bands=bands,
             static_force=static,
         ),

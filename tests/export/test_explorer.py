@@ -24,10 +24,14 @@ from jaxdamp.dampers import (
     with_command,
 )
 from jaxdamp.export import from_json, to_explorer, to_json
+from jaxdamp.export._law_program import LawProgram
+from jaxdamp.export._ride_program import RideProgram
+from jaxdamp.export.explorer_page import _of_car
 from jaxdamp.metrics import power_spectral_density
 from jaxdamp.parameters import parameter, replace
 from jaxdamp.roads import cosine_bump, from_profile, iso8608
 from jaxdamp.vehicles import presets
+from jaxdamp.vehicles.channels import OF_LINK
 from tests.dampers.test_contract import LAWS
 from tests.export.browser import started
 
@@ -162,6 +166,18 @@ def test_roads_spectra_and_channels(tmp_path, browser):
     browser.type("#bumpLength", "0")
     assert "must be positive" in browser.evaluate("document.getElementById('roadError').textContent")
     assert not browser.troubles()
+
+
+def test_channels_turn_where_their_meaning_has_the_direction():
+    law = Linear(1500.0)
+    car = RideProgram(LawProgram(law, member="."), presets.half_car_002(law), 0.001, 1001)
+    kinds = car.vehicle.layout.by_name
+    with shown_in(Display(sign="compression-positive")):
+        channels = _of_car(car)["channels"]
+    assert {"front_stroke", "front_damper_velocity", "front_dynamic_tyre_load"} <= {one["name"] for one in channels}
+    for one in channels:
+        assert one["signed"] == (kinds[one["name"]].kind in OF_LINK), one
+        assert "extension positive" not in one["meaning"]
 
 
 def test_units_and_sign_of_a_shop(tmp_path, browser):

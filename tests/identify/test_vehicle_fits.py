@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import bench, identify, roads
+from jaxdamp._display import Display, shown_in
 from jaxdamp.dampers import Bilinear, CoulombFriction, Linear
 from jaxdamp.identify import vehicle_residuals
 from jaxdamp.identify.model import VehicleTest
@@ -87,7 +88,10 @@ def test_a_fitted_vehicle_predicts_a_record_that_it_was_not_fitted_to(motions, r
 
 @pytest.mark.exhaustive
 def test_a_result_is_drawn_and_predicts_its_records(motions, record):
-    assert len(motions.plot().axes) == 4
+    with shown_in(Display(sign="compression-positive")):
+        axes = motions.plot().axes
+    turned = [score.channel == "stroke" for score in motions.scores for _ in ("record", "residual")]
+    assert [panel.yaxis_inverted() for panel in axes] == turned and len(axes) == 4
     predicted = motions.respond(record)["stroke"]
     assert np.std(predicted - record["stroke"]) == pytest.approx(2e-4, rel=0.05)
 

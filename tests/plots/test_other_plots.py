@@ -186,7 +186,7 @@ def test_ride_refuses_what_is_not_there(responses: dict[str, Response]) -> None:
 
 def test_other_channels_get_a_label_with_their_unit(responses: dict[str, Response]) -> None:
     figure = plots.ride(responses, channels=["damper_force", "relative_tyre_load"])
-    assert figure.axes[0].get_ylabel() == "damper force [N]"
+    assert figure.axes[0].get_ylabel() == "damper force [N]\n(+\N{NO-BREAK SPACE}resists extension)"
     assert figure.axes[1].get_ylabel() == "relative tyre load [–]"
 
 

@@ -1,5 +1,6 @@
 """Pages of fits, rides and tunings: what stands on them, without the command line."""
 
+import dataclasses
 import pickle
 import re
 from collections.abc import Callable
@@ -25,11 +26,13 @@ from jaxdamp.report import (
     chain_report,
     chains,
     fit_report,
+    fits,
     law_evaluation,
     ride_report,
     ride_verdict,
     tuning_report,
 )
+from jaxdamp.rig import Rig
 from jaxdamp.simulation import Response, Ride
 from jaxdamp.tune import TuneResult
 
@@ -82,6 +85,18 @@ def test_a_page_on_fits(comparison: Comparison, tmp_path: Path) -> None:
     ]
     places = [body.index(text) for text in order]
     assert places == sorted(places)
+
+
+def test_the_picture_of_the_curves_names_the_friction_in_the_measured_points(comparison: Comparison) -> None:
+    best = comparison.best
+    held = best._replace(result=dataclasses.replace(best.result, rig=Rig(friction=12.3, force_offset=20.0)))
+    report, pictures = Report("Fits"), []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(report, "picture", lambda draw, *_: pictures.append(draw()))
+        fits._add_curves(report, dataclasses.replace(comparison, rungs=(held,)), None)
+    ((note,),) = [[figure.get_supxlabel()] for figure in pictures]
+    assert "The measured points hold the friction of the machine, 12.3 N, the laws do not." in " ".join(note.split())
+    assert "without the static force of 20 N" in note
 
 
 @pytest.mark.exhaustive
