@@ -30,6 +30,7 @@ MOST = 4  # processes, this one too
 PATIENCE = 1.0  # s to put things in order at the end
 _Call: TypeAlias = tuple[Callable[..., object], tuple[object, ...]]
 UNPICKLED = (pickle.PicklingError, AttributeError, TypeError)
+HEARD = {signal.SIGINT, signal.SIGTERM}
 DIE_WITH_PARENT = 1  # of Linux: `PR_SET_PDEATHSIG`
 
 
@@ -276,13 +277,23 @@ def _forked(prepare: Callable[[], object]) -> Process:
     with warnings.catch_warnings():
         # Of threads, which are those of linear algebra, ended and begun anew by it, and the one that waits for Ctrl-C.
         warnings.simplefilter("ignore", DeprecationWarning)
-        pid = os.fork()
+        # What the new process hears before it listens for itself would be told to the thread of this one.
+        mask, pid = signal.pthread_sigmask(signal.SIG_BLOCK, HEARD), -1
+        try:
+            pid = os.fork()
+        finally:
+            if pid:
+                signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     if pid:
         there.close()
         return Process(pid, here)
-    here.close()
     code = 1
     try:
+        signal.set_wakeup_fd(-1)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C of a terminal goes to both: the other side decides
+        signal.signal(signal.SIGTERM, lambda number, frame: sys.exit())
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        here.close()
         _serve(there.makefile("rwb"), prepare)
         code = 0
     finally:  # never back into the command
@@ -297,9 +308,6 @@ def _serve(stream: io.BufferedRWPair, prepare: Callable[[], object]) -> None:
     """Compute what comes, until the other side ends."""
     import jax
 
-    signal.set_wakeup_fd(-1)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C of a terminal goes to both: the other side decides
-    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit())
     ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL)
     jax.config.update("jax_platforms", "cpu")  # a GPU is the other side's
     prepare()

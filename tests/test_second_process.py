@@ -79,3 +79,26 @@ def test_without_processes_all_is_computed_here() -> None:
     assert _second_process.count() == 0
     assert _second_process.elsewhere(sum, (1, 2)) is None
     assert _second_process.anywhere(sum, (1, 2)) == 3
+
+
+ENDED_AT_ONCE = """
+import os, time
+from jaxdamp import _second_process as second
+from jaxdamp.cli.interrupt import watched
+fork = os.fork
+def slowly():
+    if not (pid := fork()):
+        time.sleep(0.3)  # as on a busy machine
+    return pid
+os.fork, second.usable_cores = slowly, lambda: 2
+with watched():
+    with second.opened(lambda: None):
+        assert second.count() == 1
+    time.sleep(0.3)
+print("whole")
+"""
+
+
+def test_a_command_that_ends_before_its_processes_have_begun_is_not_stopped_by_their_end() -> None:
+    done = subprocess.run([sys.executable, "-c", ENDED_AT_ONCE], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "whole\n", "")
