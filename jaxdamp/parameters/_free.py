@@ -247,7 +247,9 @@ def _limits_by_path(
         _checks.refuse("bounds", "be a mapping as {'rate': (1000.0, 5000.0)}", repr(bounds))
     limits = {}
     for name, pair in bounds.items():
-        if np.shape(pair) != (2,) or not np.all(np.isfinite(pair)) or not pair[0] < pair[1]:
+        ends = np.asarray(pair)
+        numbers = ends.shape == (2,) and ends.dtype.kind in "iuf" and np.all(np.isfinite(ends))
+        if not numbers or not pair[0] < pair[1]:
             remedy = "For a side without a limit, give a number that is never reached."
             _checks.refuse(f"bounds[{name!r}]", "be two finite numbers in increasing order", pair, remedy)
         named = [leaders.get(path, path) for path in match_paths(known, [name])]

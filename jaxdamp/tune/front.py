@@ -1,6 +1,7 @@
 """A front: the designs of which none is better in one objective without being worse in another."""
 
 import dataclasses
+from collections.abc import Mapping, Sequence
 from typing import Generic, NamedTuple
 
 import jax.numpy as jnp
@@ -30,27 +31,32 @@ def non_dominated(values: Float[np.ndarray, "points objectives"]) -> Bool[np.nda
 
 
 @of_known_numbers
-def hypervolume(values: Float[np.ndarray, "points objectives"], reference: Float[np.ndarray, " objectives"]) -> float:
+def hypervolume(
+    values: Float[np.ndarray, "points objectives"] | Sequence[Sequence[float]],
+    reference: Mapping[str, float] | Sequence[float] | Float[np.ndarray, " objectives"],
+) -> float:
     """Volume of objectives that at least one point beats, up to a reference point, by slices along the last objective.
 
     Arguments:
         values: objectives of each point, shape (points, objectives).
-        reference: values that count as worst, shape (objectives,).
+        reference: values that count as worst, one for each objective, such as the `reference` of a front.
 
     >>> hypervolume(np.array([[1.0, 2.0], [2.0, 1.0]]), np.array([3.0, 3.0]))
     3.0
     """
-    if values.ndim != 2 or values.shape[1:] != np.shape(reference):
-        remedy = "Give one value for each objective, as `front.reference.values()`."
-        _checks.refuse("reference", "have one value for each column of `values`", f"of {np.shape(reference)}", remedy)
-    values = values[np.all(values < reference, axis=1)]
+    values = np.asarray(values, float)
+    worst = np.array([*(reference.values() if isinstance(reference, Mapping) else reference)], float)
+    if values.ndim != 2 or values.shape[1:] != worst.shape:
+        remedy = "Give one value for each objective, as `front.reference`."
+        _checks.refuse("reference", "have one value for each column of `values`", f"of {worst.shape}", remedy)
+    values = values[np.all(values < worst, axis=1)]
     if not len(values):
         return 0.0
     if values.shape[1] == 1:
-        return float(reference[0] - values.min())
+        return float(worst[0] - values.min())
     values = values[np.argsort(values[:, -1])]
-    heights = np.diff(np.append(values[:, -1], reference[-1]))
-    areas = [hypervolume(values[: i + 1, :-1], reference[:-1]) if h > 0 else 0.0 for i, h in enumerate(heights)]
+    heights = np.diff(np.append(values[:, -1], worst[-1]))
+    areas = [hypervolume(values[: i + 1, :-1], worst[:-1]) if h > 0 else 0.0 for i, h in enumerate(heights)]
     return float(heights @ areas)
 
 

@@ -239,3 +239,8 @@ class _Deaf(AbstractMemoryless):
 def test_broken_law_fails(broken, check):
     with pytest.raises(AssertionError, match=f"^{broken.__name__} breaks '{check}': "):
         check_law(broken(1000.0), leave_out=set(CHECKS) - {check})
+
+
+def test_an_infinite_slope_is_named_before_what_follows_from_it() -> None:
+    with pytest.raises(AssertionError, match=r"_InfiniteSlope breaks 'finite': .* not finite at v = "):
+        check_law(_InfiniteSlope(jnp.asarray(1000.0)), leave_out={"shapes", "refusals", "parameters", "text", "file"})

@@ -52,6 +52,8 @@ def test_knee_hypervolume_and_reference(front):
     assert reference == pytest.approx(fine.max(axis=0) + 0.1 * np.ptp(fine, axis=0), rel=3e-5)
     full = tune.hypervolume(fine, reference)
     assert 0.9 * full < front.hypervolume < full
+    for given in (front.reference, list(reference)):
+        assert tune.hypervolume(front.objectives.tolist(), given) == pytest.approx(front.hypervolume)
 
 
 def test_every_point_is_a_vehicle_that_can_be_written(front):
