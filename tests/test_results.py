@@ -132,7 +132,7 @@ def _tunings() -> list[AbstractResult]:
     valving = tune.ValvingResult(
         law=law, start=law, parameters=(valve,), velocity=speed, target_force=1000.0 * speed, force=900.0 * speed,
         curve_points=2, loop_lengths=(), rmse=10.0, error_percent=10.0, tolerance=0.02, out_of_reach=(part,),
-        status=Status.CONVERGED,
+        status=Status.CONVERGED, cavities=np.array([True, False]),
     )  # fmt: skip
     return [
         tuning,

@@ -1,10 +1,11 @@
 """The result of a choice of valving."""
 
 import dataclasses
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._status import Status
@@ -66,6 +67,7 @@ class ValvingResult(AbstractResult):
         tolerance: largest relative error of a feasible valving.
         out_of_reach: the parts of the target that the damper does not reach.
         status: how the search ended.
+        cavities: at which of the compared forces a cavity takes more than a tenth of the tolerance from the damper.
     """
 
     law: MonoTube | TwinTube
@@ -81,6 +83,7 @@ class ValvingResult(AbstractResult):
     tolerance: float
     out_of_reach: tuple[OutOfReach, ...]
     status: Status
+    cavities: Bool[np.ndarray, " samples"]
 
     @property
     def feasible(self) -> bool:
@@ -97,9 +100,19 @@ class ValvingResult(AbstractResult):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """The parts of the target out of reach, and a search that did not end at an optimum."""
+        """The parts of the target out of reach, cavities, and a search that did not end at an optimum."""
         ended = () if self.status is Status.CONVERGED else (self.status.sentence,)
-        return (*(part.sentence for part in self.out_of_reach), *ended)
+        return (*(part.sentence for part in self.out_of_reach), *self._on_cavities(), *ended)
+
+    def _on_cavities(self) -> Iterator[str]:
+        """A sentence on each direction in which a cavity opens."""
+        for side, inside in (("rebound", self.velocity > 0.0), ("compression", self.velocity < 0.0)):
+            if np.any(at := inside & self.cavities):
+                slowest, error = np.abs(self.velocity[at]).min(), np.abs(self.force - self.target_force)[at].max()
+                yield (
+                    f"In {side} a cavity opens from {slowest:.2g} m/s on, with an error of up to {error:.0f} N: start "
+                    "from a higher `gas.pressure` and freeze it, or bound it from below."
+                )
 
     def table(self) -> Table:
         """The chosen numbers with start, bounds and meaning."""

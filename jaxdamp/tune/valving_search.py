@@ -36,6 +36,7 @@ BINDING = 0.02  # decrease of the squared error per 100 % of a parameter beyond 
 CLOSE_ENOUGH = 0.05  # of the tolerance, at which no further start is tried
 HOPS = (0.01, 0.1)  # relative changes of each parameter that must not lower the error at the end of a search
 LOWER = 1e-6  # relative decrease of the squared error that is worth another search
+CAVITY = 0.1  # of the tolerance, above which a difference by cavities is named
 APART = 2.0  # a start is a factor of up to so much from the given one, within the bounds
 
 
@@ -106,13 +107,16 @@ def valving(
     If the remaining error is above the tolerance, the result says in which range of velocity, by how much, and which
     bound prevents more.
 
+    Curves are compared without cavities, which have no slope that leads out of them; the error that is stated holds
+    them, and a sentence says where one opens.
+
     The force has kinks where valves open, and rises within a sample or two where a cavity closes, so the sum of squares
     has narrow local minima. Where a search ends, each parameter is therefore changed by 1 and 10 %, up and down, and
     the search continues from the best of these as long as one of them has a smaller error.
 
     Arguments:
         target: the wanted force: a law; a force-velocity curve `(velocities [m/s], forces [N])`; or one or more
-            measured records, with hysteresis.
+            measured records, with hysteresis. It holds the gas force at mid-stroke, which the damper has.
         start: the damper to start from, with the geometry that is to stay.
         velocities: of the curve of a law [m/s]; −1 to 1 m/s if left out.
         motions: of a law also loops of sinusoidal motion, `[(frequency [Hz], amplitude [m]), ...]`, for its hysteresis.
@@ -152,7 +156,9 @@ def valving(
     best = _best(space, force_of, wanted.all_forces, starts, max_steps, CLOSE_ENOUGH * tolerance)
     if best is None:
         _checks.refuse("start", "give a finite force", start, "Widen its valves, or shorten the motion.")
-    reached, slopes = force_of(best.values)
+    compared, slopes = force_of(best.values)
+    law = space.free.build(jnp.asarray(best.values, space.free.values.dtype))
+    reached, cavities = _with_cavities(law, wanted, compared, CAVITY * tolerance * size)
     error = reached - wanted.all_forces
     parameters = tuple(
         ValveParameter(c.name, c.unit, c.before, c.after, c.lower, c.upper, c.note, p.meaning)
@@ -161,7 +167,7 @@ def valving(
     rmse = float(np.sqrt(np.mean(error**2)))
     far = rmse > tolerance * size
     return ValvingResult(
-        law=space.free.build(jnp.asarray(best.values, space.free.values.dtype)),
+        law=law,
         start=start,
         parameters=parameters,
         velocity=wanted.all_velocities,
@@ -174,7 +180,20 @@ def valving(
         tolerance=tolerance,
         out_of_reach=_out_of_reach(wanted, error, slopes, parameters, tolerance * size) if far else (),
         status=best.status,
+        cavities=cavities,
     )
+
+
+def _with_cavities(
+    law: MonoTube | TwinTube, wanted: Wanted, compared: np.ndarray, allowed: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The forces, with those of settled states where these differ by more, and where: a search sees no cavities."""
+    count = wanted.velocity.size
+    own = compared.copy()
+    if count:
+        own[:count] = np.asarray(quasi_static(law, wanted.velocity).force)
+    cavities = np.abs(own - compared) > allowed  # not where no state settles
+    return np.where(cavities, own, compared), cavities
 
 
 def _best(
