@@ -167,6 +167,8 @@ def solve_by(
     priors = [part for part in problem.residuals if isinstance(part, Priors)]
     if loss == "squares" and not priors:
         return problem, solution
+    if priors:
+        solution = solution._replace(noise=float(priors[0].noise))  # which stays where nothing is left to explain
     rounds = 1 if loss == "squares" and not any(part.relative for part in priors) else ROUNDS
     now = Round(problem)
     for _ in range(rounds):

@@ -24,6 +24,7 @@ from jaxdamp.dampers import (
 )
 from jaxdamp.identify.blending import off_span
 from jaxdamp.identify.contradicting import contradicting
+from jaxdamp.identify.covered import covered_range
 from jaxdamp.identify.estimates import Estimate
 from jaxdamp.identify.estimating import Estimates, estimate, on_misfit
 from jaxdamp.identify.identifiability import gas_in_words
@@ -32,7 +33,6 @@ from jaxdamp.identify.left_out import left_out
 from jaxdamp.identify.model import (
     Model,
     count_states,
-    covered_range,
     is_memoryless,
     law_of,
     of_record,

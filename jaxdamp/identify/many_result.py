@@ -15,11 +15,12 @@ from jaxdamp._status import Status
 from jaxdamp._tables import Cell, Column, Contents, Shown, Table, plain, with_unit
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, Scheduled, with_fitted_range
+from jaxdamp.identify.covered import covered_range, joined_range
 from jaxdamp.identify.dependence import OWN, Dependence
 from jaxdamp.identify.estimates import rounded
 from jaxdamp.identify.estimating import WEAK
 from jaxdamp.identify.initial_states import DRIFT
-from jaxdamp.identify.model import Model, covered_range, joined_range, law_of, rig_of, with_range
+from jaxdamp.identify.model import Model, law_of, rig_of, with_range
 from jaxdamp.identify.settings import FitSettings
 from jaxdamp.identify.stated import stated_parameters, with_stated
 from jaxdamp.parameters import Coordinates, FreeParameters

@@ -180,4 +180,4 @@ def _error_of(best: Rung, rungs: Sequence[Rung], held_out: Sequence[BenchRun]) -
         f"held-out fit {percent:.1f} %" if best.judged_on else f"fit {percent:.1f} % on the records it was fitted to"
     )
     how = f" ({best.judged_on})" if best.judged_on else "; nothing could be held out"
-    return f"{lead}, {where}, RMSE {best.error:.3g} N, {share:.1f} % of the largest force of {largest:.0f} N{how}."
+    return f"{lead}, {where}, RMSE {best.error:.4g} N, {share:.1f} % of the largest force of {largest:.0f} N{how}."

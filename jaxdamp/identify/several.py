@@ -39,7 +39,7 @@ class Solution(NamedTuple):
     ends: tuple[SearchEnd, ...]  # those that converged, the best among them, in the order of their starts
     starts: int
     closed_form: bool = False  # there is one minimum, which was computed
-    noise: float | None = None  # of a weighted sample, relative to which priors count; None without priors
+    noise: float | None = None  # of a weighted sample, relative to which priors count; None of plain least squares
 
 
 def other_starts(free: FreeParameters, reach: Reach) -> list[Float[np.ndarray, " free"]]:

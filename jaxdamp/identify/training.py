@@ -20,10 +20,11 @@ from jaxdamp._tables import Column, Contents, Table, with_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.identify.contradicting import contradicting, refuse_contradicting
+from jaxdamp.identify.covered import covered_range
 from jaxdamp.identify.judging import notes_on
 from jaxdamp.identify.law_result import AbstractFitted
 from jaxdamp.identify.machine import Machine
-from jaxdamp.identify.model import Model, covered_range, law_of, rig_of, with_range
+from jaxdamp.identify.model import Model, law_of, rig_of, with_range
 from jaxdamp.identify.predicting import score
 from jaxdamp.identify.preparing import prepare, weighting_of
 from jaxdamp.identify.problem import Problem

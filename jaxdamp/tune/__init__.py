@@ -19,7 +19,7 @@ from jaxdamp.tune.decisions import DamperComparison as DamperComparison, compare
 from jaxdamp.tune.front import ParetoFront as ParetoFront, hypervolume as hypervolume
 from jaxdamp.tune.limits import Limits as Limits, half_interval as half_interval, limit_spans as limit_spans
 from jaxdamp.tune.minimising import minimise
-from jaxdamp.tune.objective import Targets, smooth_peak, smooth_settling
+from jaxdamp.tune.objective import Targets
 from jaxdamp.tune.pareto_search import pareto
 from jaxdamp.tune.ranges import Choice
 from jaxdamp.tune.rescoring import Rescore as Rescore, rescore
@@ -31,6 +31,7 @@ from jaxdamp.tune.sensitivities import sensitivity
 from jaxdamp.tune.sensitivity_result import Sensitivity as Sensitivity
 from jaxdamp.tune.settings import Design, Run, Search
 from jaxdamp.tune.shape import damper_paths as damper_paths, knee, monotone, ratio, slope
+from jaxdamp.tune.smooth import smooth_peak, smooth_settling
 from jaxdamp.tune.valving_result import ValvingResult as ValvingResult
 from jaxdamp.tune.valving_search import valving
 from jaxdamp.tune.verdict import Outcome as Outcome, change_in_percent as change_in_percent

@@ -20,13 +20,14 @@ from jaxdamp.tune.descending import missed
 from jaxdamp.tune.front import FrontParameter, ParetoFront, non_dominated, shares_of
 from jaxdamp.tune.limits import Limit, limit_ends, margins
 from jaxdamp.tune.measuring import LANES, ride_on
-from jaxdamp.tune.objective import Function, check_objective, exact_counterpart
+from jaxdamp.tune.objective import Function, check_objective
 from jaxdamp.tune.ranges import start_points
 from jaxdamp.tune.rescoring import other_roads
 from jaxdamp.tune.result import V
 from jaxdamp.tune.scenario_ride import ScenarioRide, smooth_in_scenarios
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import DEFAULTS, Settings
+from jaxdamp.tune.smooth import exact_counterpart
 from jaxdamp.tune.task import DesignTask, Evaluator, check_call
 from jaxdamp.tune.tracing import NO_CONFLICT, FrontProblem, lattice, range_of, trace_front
 from jaxdamp.tune.verdict import missed_notes

@@ -11,8 +11,9 @@ from jaxdamp._status import Status
 from jaxdamp.metrics import Metric
 from jaxdamp.solve import Evaluation
 from jaxdamp.tune.limits import WITHIN, Limit, LimitRange, amount, excess, in_each, lost_limits
-from jaxdamp.tune.objective import Objective, exact_counterpart
+from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.ranges import FACTOR, Change, SearchRange
+from jaxdamp.tune.smooth import exact_counterpart
 from jaxdamp.vehicles import AbstractVehicle, ChannelKind
 
 

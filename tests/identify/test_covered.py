@@ -9,7 +9,7 @@ import pytest
 from jaxdamp import bench, identify
 from jaxdamp.bench import BenchRun, SineTest
 from jaxdamp.dampers import Bilinear, Lag, Linear, Spring, TemperatureScaled, with_fitted_range
-from jaxdamp.identify.model import covered_range
+from jaxdamp.identify.covered import covered_range
 from jaxdamp.rig import Rig, gas_and_friction
 
 

@@ -71,6 +71,12 @@ def test_three_steps_and_a_program_weigh_a_prior_as_a_fit_does(sines, start):
     np.testing.assert_allclose(values, [p.value for p in whole.parameters], atol=0.01 * error, rtol=1e-4)
 
 
+def test_a_prior_beside_records_without_noise_has_a_noise_to_be_taken_too(sines):
+    problem = prepare(Bilinear(2000.0, 2000.0), sines(TRUTH), priors={"rebound_rate": (2600.0, 5.0)})
+    values = problem.at_noise(solve(problem).noise).minimum()
+    np.testing.assert_allclose(values, [2600.0, 1200.0], rtol=1e-6)
+
+
 @pytest.mark.parametrize("memory", [0.0, 0.95])
 @pytest.mark.parametrize("deviation", [10.0, 100.0])
 def test_a_prior_is_weighed_against_noise_with_a_memory(sines, memory, deviation):

@@ -59,7 +59,7 @@ def test_the_verdict_names_the_law_that_has_what_the_static_one_lacks() -> None:
     first, why, second, third = comparison.verdict
     largest = float(np.abs(runs[2].force).max())
     assert first.startswith("Recommended: lagging, held-out fit 99.")
-    assert f"RMSE {comparison.best.error:.3g} N" in first
+    assert f"RMSE {comparison.best.error:.4g} N" in first
     assert why.startswith("No other law predicts as well: the next error is ")
     assert f"of the largest force of {largest:.0f} N" in first
     assert second.startswith("The best law of velocity alone is linear: ") and "is hysteresis" in second

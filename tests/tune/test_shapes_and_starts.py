@@ -9,7 +9,7 @@ import pytest
 
 from jaxdamp import Ride, dampers, metrics, parameters, roads, tune, vehicles
 from jaxdamp.metrics import Metric
-from jaxdamp.tune import objective as smooth_metrics
+from jaxdamp.tune import smooth as smooth_metrics
 from jaxdamp.tune.ranges import search_range, start_points
 from jaxdamp.tune.shape import held_force
 
