@@ -98,6 +98,7 @@ def test_every_rung_of_the_ladder_starts_inside_its_domain(maxwell_runs):
         (Bilinear, {"bounds": {"compresion_rate": (1.0, 2.0)}}, "did you mean 'compression_rate'"),
         (Bilinear(2000.0, 1000.0), {"bounds": {"rebound_rate": (1.0, 500.0)}}, "start strictly between 1 and 500"),
         (Bilinear, {"bounds": {"rebound_rate": (5.0, 1.0)}}, "two finite numbers in increasing order"),
+        (Bilinear, {"bounds": {"rebound_rate": (5.0, None)}}, "two finite numbers in increasing order"),
         (Bilinear, {"freeze": ["*"]}, "All parameters are frozen"),
         (Bilinear, {"weighting": "run"}, "Did you mean 'runs'"),
         (Bilinear, {"weighting": [1.0, 2.0]}, "one number for each of 3 records"),
