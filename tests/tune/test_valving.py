@@ -85,7 +85,7 @@ def test_a_cavity_is_in_the_error_and_its_remedy_works():
     sheet = v, np.asarray(rig.quasi_static(TRUTH, v).force) - float(TRUTH.force(0.0, 0.0, jnp.zeros(1)))
     result = tune.valving(sheet, TRUTH, starts=2)  # which lowers the gas pressure, as a sheet is without gas force
     own = np.asarray(rig.quasi_static(result.law, v).force)
-    np.testing.assert_allclose(result.force, own, atol=0.1 * result.tolerance * np.std(sheet[1]))
+    np.testing.assert_allclose(result.force, own, atol=float(0.1 * result.tolerance * np.std(sheet[1])))
     assert result.rmse == pytest.approx(np.sqrt(np.mean((own - sheet[1]) ** 2)), rel=0.02)
     (said,) = [text for text in result.warnings if "cavity" in text]
     first, largest = np.abs(v[result.cavities]).min(), np.abs(own - sheet[1]).max()
