@@ -66,7 +66,9 @@ def test_derivatives_in_both_modes_to_second_order():
     assert np.all(np.isfinite(at_zero))
 
 
-@pytest.mark.parametrize("function", [exponential, logarithm, reciprocal_root, lambda x: power(x, 1.7)])
+@pytest.mark.parametrize(
+    "function", [exponential, logarithm, reciprocal_root, pytest.param(lambda x: power(x, 1.7), marks=pytest.mark.slow)]
+)
 def test_second_derivatives_over_a_loop(function):
     """Forward over reverse sees the text of a function where a loop forgets its custom derivative."""
 

@@ -32,6 +32,7 @@ def test_derivatives_are_those_of_the_inverse():
         np.testing.assert_allclose(by_matrix, expected, rtol=1e-8, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_a_sweep_on_a_white_road_ends():
     """With routines of LAPACK inside, as many devices as threads wait for one another for ever."""
     code = """

@@ -45,6 +45,7 @@ def test_only_what_is_small_and_called_by_itself_takes_the_options(monkeypatch: 
         make()(jnp.ones(2))
 
 
+@pytest.mark.slow
 def test_a_ride_on_a_white_road_is_one_function_in_a_loop_a_batch_and_a_program() -> None:
     road = roads.white("C", 20.0)
     ride = Ride(vehicles.presets.quarter_car_000(dampers.Bilinear(2600.0, 1200.0)), road)

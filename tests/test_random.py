@@ -79,7 +79,9 @@ ROADS = {
 }
 
 
-@pytest.mark.parametrize("kind", ROADS)
+@pytest.mark.parametrize(
+    "kind", ["iso8608", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ROADS if kind != "iso8608")]
+)
 def test_a_seed_is_one_road_in_every_precision_and_batch(kind):
     make, time = ROADS[kind], np.arange(400) * 0.01
     double = np.asarray(make(5).height(time))

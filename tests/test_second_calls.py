@@ -75,7 +75,10 @@ CALLS = {
 }
 
 
-@pytest.mark.parametrize("name", CALLS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] * (name in ("sweep", "respond by a solver"))) for name in CALLS],
+)
 @pytest.mark.exhaustive_cases("Ride by a solver", "simulate by a solver", "simulate by an engine")
 def test_of_a_law_with_other_numbers(name):
     first, *others = in_calls(CALLS[name], [1500.0, 1700.0, 1900.0])
@@ -154,7 +157,7 @@ TUNINGS: dict[str, Any] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", TUNINGS)
+@pytest.mark.parametrize("name", [pytest.param("minimise", marks=pytest.mark.slow), "pareto"])
 def test_of_a_tuning_from_other_numbers(name):
     first, *others = in_calls(lambda rate: TUNINGS[name](rate).before, [1500.0, 1700.0])
     assert first > 0 and others == [0]

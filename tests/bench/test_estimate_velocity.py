@@ -103,7 +103,7 @@ def test_what_is_not_steady_and_periodic_goes_to_savitzky_golay(motion, bound, r
 @pytest.mark.parametrize(("rate", "frequency"), [(2000, 1.5), (2000, 10), (2000, 30)])
 def test_savitzky_golay_window_follows_the_noise(rate, frequency, noise, bound, rng):
     time, stroke, truth = _sine(rate, frequency, 0.01)
-    for _ in range(20 if noise else 1):
+    for _ in range(5 if noise else 1):
         noisy = stroke + noise * rng.standard_normal(len(time))
         velocity, _ = estimate_velocity(time, noisy, method="savitzky-golay")
         assert _error(velocity, truth) < bound

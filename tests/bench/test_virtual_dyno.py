@@ -35,7 +35,10 @@ def test_law_with_state_is_steady_and_exact(frequency, rate):
         assert np.max(np.abs(run.force - truth)) < 1e-5 * np.max(np.abs(truth))
 
 
-@pytest.mark.parametrize("law", [Lag(Bilinear(2600.0, 1200.0), 4e-3), SeriesSpring(Linear(2000.0), 1e6)])
+@pytest.mark.parametrize(
+    "law",
+    [Lag(Bilinear(2600.0, 1200.0), 4e-3), pytest.param(SeriesSpring(Linear(2000.0), 1e6), marks=pytest.mark.slow)],
+)
 def test_printed_laws_give_the_records_of_xla(law, monkeypatch):
     machine = {"gas_force": -80.0, "gas_stiffness": 900.0, "friction": 15.0, "moving_mass": 2.0, "force_offset": 12.0}
     rig = Rig(**machine, stroke_offset=3e-3, force_delay=2e-3, force_lag=1e-3)
@@ -160,10 +163,10 @@ def test_resolution():
 
 
 def test_spikes():
-    test = SineTest(0.01, 4.0, cycles=400)
+    test = SineTest(0.01, 4.0, cycles=100)
     spikes = channel("force", test, spike_rate=3.0, spike_size=250.0) - channel("force", test)
     hit = np.abs(spikes) > 1e-9
-    assert np.count_nonzero(hit) == pytest.approx(300, abs=4 * np.sqrt(300))  # of 100 s
+    assert np.count_nonzero(hit) == pytest.approx(75, abs=4 * np.sqrt(75))  # of 25 s
     np.testing.assert_allclose(np.abs(spikes[hit]), 250.0)
     assert 0.4 < np.mean(spikes[hit] > 0) < 0.6
 

@@ -20,6 +20,7 @@ def test_all_laws_need_few_programs(tmp_path) -> None:
     assert 0 < int(programs) <= 15
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "script",
     [

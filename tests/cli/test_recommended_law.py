@@ -32,7 +32,13 @@ SITUATIONS = {
 }
 
 
-@pytest.mark.parametrize("situation", SITUATIONS)
+@pytest.mark.parametrize(
+    "situation",
+    [
+        pytest.param(each, marks=[pytest.mark.slow] * (each not in ("one record", "nearly all noise")))
+        for each in SITUATIONS
+    ],
+)
 def test_verdict_object_file_and_page_never_disagree(situation: str, tmp_path: Path) -> None:
     law, tests, held, noise = SITUATIONS[situation]
     runs = VirtualDyno(law, sampling_rate=400.0, force_noise=noise).run(tests)

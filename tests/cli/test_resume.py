@@ -102,6 +102,7 @@ def test_a_fit_goes_on_after_its_finished_laws(records: Path, cache: Path, monke
     assert "Resumed with what an interrupted run had finished." in output
 
 
+@pytest.mark.slow
 def test_a_tuning_goes_on_after_its_last_step(cache: Path) -> None:
     _resumed([*TUNE], lambda patch: _counted(patch, measuring.BatchProgram, "at", last=4), cache)
 

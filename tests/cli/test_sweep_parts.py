@@ -34,6 +34,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> str:
     return (out / "sweep.csv").read_text()
 
 
+@pytest.mark.slow
 def test_parts_in_any_order_are_the_sweep_of_one_process(
     tmp_path: Path, whole: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -60,6 +60,7 @@ def test_tune_writes_a_better_law(law: Path, tmp_path: Path) -> None:
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_numbers_of_a_controller_are_tuned_and_written_for_a_ride(tmp_path: Path) -> None:
     car = vehicles.presets.quarter_car_000(Scheduled((Linear(900.0), Linear(6e3)), levels=[0.0, 1.0], command=0.2))
     to_json(car, tmp_path / "car.json")
@@ -81,6 +82,7 @@ def test_the_numbers_of_a_controller_are_tuned_and_written_for_a_ride(tmp_path: 
     assert "have a damper with one `Scheduled` law" in plain
 
 
+@pytest.mark.slow
 def test_limits_in_the_units_of_a_shop_are_those_in_si(tmp_path: Path) -> None:
     """Also within a range, and printed back in the units that are shown; bounds of parameters too."""
     words = ["tune", "quarter_car_000", "white:C", "--max-steps", "1", "--fresh-roads", "0"]
@@ -236,13 +238,20 @@ FILES = {
 }
 
 
-def test_parameters_are_tied_after_a_vehicle_file_sets_them_equal(tmp_path: Path) -> None:
-    to_json(Bilinear(2600.0, 1200.0), tmp_path / "law.json")
-    words = ["white:C", "--start", tmp_path / "law.json", "--tie", "damper.compression_rate=damper.rebound_rate"]
+def _tied(folder: Path) -> list:
+    to_json(Bilinear(2600.0, 1200.0), folder / "law.json")
+    return ["white:C", "--start", folder / "law.json", "--tie", "damper.compression_rate=damper.rebound_rate"]
+
+
+def test_parameters_that_differ_are_not_tied(tmp_path: Path) -> None:
     remedy = "with damper.compression_rate = NUMBER below [parameters] of VEHICLE.toml."
-    assert remedy in refused(tmp_path, "tune", "quarter_car_000", *words)
+    assert remedy in refused(tmp_path, "tune", "quarter_car_000", *_tied(tmp_path))
+
+
+@pytest.mark.slow
+def test_parameters_are_tied_after_a_vehicle_file_sets_them_equal(tmp_path: Path) -> None:
     file = _toml(tmp_path, 'preset = "quarter_car_000"\n[parameters]\ndamper.compression_rate = 2600.0\n')
-    jaxdamp("tune", file, *words, "--limit", "grip=none", "--out", tmp_path / "tuned")
+    jaxdamp("tune", file, *_tied(tmp_path), "--limit", "grip=none", "--out", tmp_path / "tuned")
     law = from_json(tmp_path / "tuned" / "law.json")
     assert float(law.compression_rate) == float(law.rebound_rate) > 2600.0
 

@@ -165,6 +165,7 @@ def test_loops_inside_a_step(count):
     assert np.isfinite(printed).all() and (count == 1 or np.ptp(printed) > 0.01)
 
 
+@pytest.mark.slow
 def test_laws_with_functions():
     """Powers are exponentials of logarithms, in vectors; two searches in a step, which take exponentials."""
     with_its_loops(PowerLaw(1800.0, 0.55, 900.0, 1.8) + SeriesSpring(PiecewiseLinear([-0.1], [9e2, 2e3], 0.01), 1e6))
@@ -288,6 +289,7 @@ ROAD = roads.iso8608("C", speed=20.0, seed=1)
 CAR = vehicles.presets.quarter_car_000(Besinger(1600.0, 4200.0, 900.0, limit_velocity=0.13, transition_velocity=0.05))
 
 
+@pytest.mark.slow
 def test_a_sweep_of_all_ride_metrics():
     over = {RATE: np.linspace(2e3, 5e3, 5), "sprung_mass": [250.0, 300.0]}
     plain, printed = (sweep(Ride(CAR, ROAD, duration=0.4, engine=Exponential(printed=p)), over) for p in (False, True))

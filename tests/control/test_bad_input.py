@@ -87,6 +87,7 @@ def test_what_cannot_be_controlled_is_refused(make, message):
         make()
 
 
+@pytest.mark.slow
 def test_a_part_of_a_run_may_be_shorter_than_the_delay():
     whole = simulate(_delayed(0.1), ROAD, duration=0.3)
     _, state = simulate(_delayed(0.1), ROAD, duration=0.05, return_state=True)

@@ -54,9 +54,12 @@ POLICIES = {
     ),
     "network": _Network(eqx.nn.MLP(3, "scalar", 4, 1, jnp.tanh, key=jax.random.key(0))),
 }
+PLAIN = ("skyhook", "preview", "network")  # a formula, memory of its own, a module without a file
 
 
-@pytest.mark.parametrize("name", POLICIES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in PLAIN)) for name in POLICIES]
+)
 def test_every_policy_satisfies_the_contract(name):
     unwritten = name == "network"  # a module of equinox
     check_policy(POLICIES[name], leave_out=["file", "driven"] if unwritten else ["driven"])

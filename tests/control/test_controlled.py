@@ -105,9 +105,18 @@ def test_without_lag_a_command_is_held_from_its_time_to_the_next(car):
     "damper",
     [
         Scheduled((Linear(300.0), Linear(900.0), Linear(3900.0)), levels=[-1.0, 0.0, 2.0], command=0.0),
-        Scheduled((Linear(300.0), Bilinear(3900.0, 3900.0)), levels=[0.0, 1.0], command=0.0, blend="force"),
-        MotionRatio(Scheduled((Linear(600.0), Linear(7800.0)), levels=[0.0, 1.0], command=0.0), 0.5**0.5),
-        3.0 * Scheduled((Linear(100.0), Linear(1300.0)), levels=[0.0, 1.0], command=0.0) + Linear(1e-3),
+        pytest.param(
+            Scheduled((Linear(300.0), Bilinear(3900.0, 3900.0)), levels=[0.0, 1.0], command=0.0, blend="force"),
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            MotionRatio(Scheduled((Linear(600.0), Linear(7800.0)), levels=[0.0, 1.0], command=0.0), 0.5**0.5),
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            3.0 * Scheduled((Linear(100.0), Linear(1300.0)), levels=[0.0, 1.0], command=0.0) + Linear(1e-3),
+            marks=pytest.mark.slow,
+        ),
     ],
     ids=["three levels", "forces", "motion ratio", "scaled, in a sum"],
 )
@@ -146,6 +155,7 @@ def test_dampers_have_policies_and_states_of_their_own():
     np.testing.assert_array_equal(part["rear_damper_command"], both["rear_damper_command"][500:])
 
 
+@pytest.mark.slow
 def test_the_body_is_what_stands_above_a_damper_also_on_seats_and_road_wheels():
     seat = Seat((SeatMass(80.0, 6e3, Scheduled((Linear(100.0), Linear(2000.0)), [0.0, 1.0], 0.0)),))
     with_seat = QuarterCar(400.0, 50.0, 20e3, 250e3, Linear(1500.0), seats=(seat,))
@@ -176,6 +186,7 @@ class Network(AbstractPolicy):
         return 1e3 * self.layers(inputs), seen.body_velocity
 
 
+@pytest.mark.slow
 def test_a_network_is_trained_through_the_ride():
     network = Network(eqx.nn.MLP(3, "scalar", 8, 1, jnp.tanh, key=jax.random.key(0)))
     ride = Ride(Controlled(quarter(), network), ROAD, metrics=METRICS, duration=1.0)
@@ -202,8 +213,10 @@ def test_a_law_with_states_is_commanded():
     ("law", "blend"),
     [
         (lambda f: BoucWen(600.0, 0.0, 150.0 * f, 1e-3), "parameters"),
-        (lambda f: LuGre(1e5 * f, 300.0, 500.0, 100.0 * f, 120.0 * f, 0.02), "force"),
-        (lambda f: Linear(600.0) + SeriesSpring(Linear(500.0 * f), 2e5), "force"),
+        pytest.param(
+            lambda f: LuGre(1e5 * f, 300.0, 500.0, 100.0 * f, 120.0 * f, 0.02), "force", marks=pytest.mark.slow
+        ),
+        pytest.param(lambda f: Linear(600.0) + SeriesSpring(Linear(500.0 * f), 2e5), "force", marks=pytest.mark.slow),
     ],
     ids=["Bouc-Wen", "LuGre", "series spring"],
 )
@@ -217,6 +230,7 @@ def test_laws_whose_states_give_the_force_are_commanded(law, blend):
     assert np.abs(error).max() < 2e-3 * np.abs(fine["z_sprung"]).max()
 
 
+@pytest.mark.slow
 def test_lags_shorter_than_a_step_are_driven_too():
     car = Controlled(quarter(), Skyhook(3000.0))
     lags = {"actuator_lag": [0.0, 1e-9, 1e-5, 1e-4, 5e-4, 9.99e-4, 1.001e-3]}  # of 1 ms
@@ -233,12 +247,14 @@ def test_steps_are_short_enough_for_all_commands():
     assert float(ride()["rms_sprung_acceleration"]) < 10.0
 
 
+@pytest.mark.slow
 def test_the_error_of_a_coarse_step_is_estimated_without_the_controller():
     half = HalfCar(700.0, 1200.0, 1.2, 1.5, Corner(40.0, 18e3, 2e6, DAMPER), Corner(45.0, 22e3, 2e6, DAMPER))
     with pytest.warns(simulation.CoarseStepWarning, match="coarse for this vehicle"):
         Ride(Controlled(half, Skyhook()), roads.iso8608("C", speed=20.0, seed=1), duration=2.0, dt=5e-3)
 
 
+@pytest.mark.slow
 def test_a_wheel_that_lifts_on_a_commanded_damper_never_pulls():
     """Lift-off computes the force of the damper a second time, which must be that of the same command."""
     law = Scheduled((Linear(5e3), Linear(3e4)), levels=[0.0, 1.0], command=1.0)
@@ -249,6 +265,7 @@ def test_a_wheel_that_lifts_on_a_commanded_damper_never_pulls():
     assert np.min(load) == pytest.approx(-1.0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_single_precision_drives_too(car):
     with jax.enable_x64(False):
         single = Controlled(quarter(Scheduled((Linear(300.0), Linear(3900.0)), [0.0, 1.0], 0.25)), Groundhook())

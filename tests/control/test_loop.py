@@ -129,8 +129,8 @@ def largest_errors(car, name, steps, delay, lag, sensor_lag=0.0, limits=None):
     ("car", "name", "delay", "lag", "sensor_lag"),
     [
         (QUARTER, "skyhook", 0.0, 0.0, 0.0),
-        (QUARTER, "hybrid", 8e-3, 0.0, 5e-3),
-        (HALF, "power driven", 3e-3, 4e-3, 0.0),
+        pytest.param(QUARTER, "hybrid", 8e-3, 0.0, 5e-3, marks=pytest.mark.slow),
+        pytest.param(HALF, "power driven", 3e-3, 4e-3, 0.0, marks=pytest.mark.slow),
     ],
 )
 def test_a_controlled_car_is_that_of_an_event_by_event_simulation(car, name, delay, lag, sensor_lag):
@@ -139,6 +139,7 @@ def test_a_controlled_car_is_that_of_an_event_by_event_simulation(car, name, del
     assert coarse / fine > 6.5  # third order: 8
 
 
+@pytest.mark.slow
 def test_a_limited_rate_is_that_of_an_event_by_event_simulation():
     coarse, fine = largest_errors(QUARTER, "skyhook", [1e-3, 0.5e-3], 3e-3, 4e-3, limits=(-30.0, 15.0))
     assert fine < 1e-5

@@ -172,6 +172,7 @@ def test_feedback_of_the_vehicle_multiplies_gains_and_signals():
     np.testing.assert_allclose([forces["front_damper"], forces["rear_damper"]], expected, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_derivatives_by_gains_through_the_ride_are_those_of_differences():
     policy = Preview(BandSkyhook(3000.0, 0.4, 6.0), jnp.array([400.0]), 0.1)
     ride = Ride(Controlled(HALF, policy, actuator_lag=4e-3), ROAD, metrics=["rms_pitch_acceleration"], duration=0.5)

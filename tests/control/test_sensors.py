@@ -170,6 +170,7 @@ def ride(car):
     return Ride(car, ROAD, metrics=METRICS, duration=1.0)
 
 
+@pytest.mark.slow
 def test_simulation_ride_sweep_and_printed_loop_have_the_same_noise(car, ride):
     response = simulate(car, ROAD, duration=1.0)
     steps = np.diff(response["damper_command"])
@@ -186,6 +187,7 @@ def test_simulation_ride_sweep_and_printed_loop_have_the_same_noise(car, ride):
         assert 1e-4 < np.ptp(np.asarray(swept[name])) / float(value) < 0.2
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_with_the_noise_of_the_whole(car):
     whole = simulate(car, ROAD, duration=0.4)
     first, state = simulate(car, ROAD, duration=0.203, return_state=True)
@@ -194,6 +196,7 @@ def test_a_run_goes_on_with_the_noise_of_the_whole(car):
     np.testing.assert_allclose(second["damper_demand"], whole["damper_demand"][203:], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_derivatives_are_those_of_differences(ride):
     start = {
         "policy.gain": 3000.0,
@@ -216,6 +219,7 @@ def test_derivatives_are_those_of_differences(ride):
         np.testing.assert_allclose(reverse[name], slope, rtol=2e-4)
 
 
+@pytest.mark.slow
 def test_a_run_with_noise_is_of_third_order_as_the_noise_belongs_to_the_samples():
     own = Sensors(body_acceleration=SignalSensor(noise=0.5), body_velocity=SignalSensor(noise=0.01))
     car = Controlled(QUARTER, Skyhook(3000.0, 0.01), 6e-3, sensors=own)

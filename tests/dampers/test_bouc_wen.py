@@ -117,7 +117,7 @@ def test_derivatives_at_rest_are_those_of_the_elastic_branch():
     np.testing.assert_allclose(jacobian, [[-0.2 / 1e-3]], rtol=1e-9)
 
 
-@pytest.mark.parametrize("n", [1.0, 1.5, 2.0, 4.0, 20.0])
+@pytest.mark.parametrize("n", [1.0, pytest.param(1.5, marks=pytest.mark.slow), 2.0, 4.0, 20.0])
 @pytest.mark.exhaustive_cases("2.0", "4.0")
 def test_derivatives_of_a_step_stay_right_up_to_the_yield_force(n, rng):
     """Where a quotient of rounding errors would be anything, up to 1e9, and differ between both modes."""

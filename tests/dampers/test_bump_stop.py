@@ -81,6 +81,7 @@ def test_derivatives_in_compression():
     np.testing.assert_allclose(forward * rows, both.T / 2e-6, rtol=1e-5, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_it_limits_the_stroke_of_a_quarter_car():
     law = Linear(1200.0) + BumpStop(0.02, 60e3, 3e8, 400.0, end="both")
 

@@ -248,6 +248,14 @@ LONG = {
     "hybrid",
     "bushing",
     "scheduled",
+    "Bouc and Wen",
+    "piston flow",
+    "frequency selective",
+    "LuGre",
+    "spline table",
+    "stroke table",
+    "surface over velocity and acceleration",
+    "schedule of forces",
 }
 
 # What a law breaks by its nature, and why. It must indeed break it; all other checks hold for it too.

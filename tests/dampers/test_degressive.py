@@ -55,6 +55,7 @@ def test_guess_mirrors_a_side_without_data(side):
     np.testing.assert_allclose(jax.tree.leaves(law), [5000.0, 2.0, 5000.0, 2.0], rtol=0.15)
 
 
+@pytest.mark.slow
 def test_quarter_car():
     law = Degressive(6000.0, 4.0, 2500.0, 2.0)
 

@@ -132,6 +132,7 @@ def test_limits_of_slow_and_fast_motion(feda):
     np.testing.assert_allclose(force, np.interp(v, *points(feda, "hf")), atol=1e-3 * both)
 
 
+@pytest.mark.slow
 def test_quarter_car():
     law = FrequencySelective(Linear(900.0), Linear(1500.0), 0.04, 0.002)
 

@@ -62,6 +62,7 @@ def test_relative_leaves_out_the_force_at_stroke_zero():
     np.testing.assert_allclose(_force(relative, 0.05) + _force(LAW, 0.0), _force(LAW, 0.05), rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_it_lifts_a_quarter_car():
     law = GasSpring(2e6, 6e-5, 1e-4, 1.3) + Linear(2500.0)
 

@@ -12,6 +12,7 @@ from .motions import last_cycle
 from .single_precision import single_precision_error
 
 
+@pytest.mark.slow
 def test_against_an_independent_solver():
     rebound, compression, friction, scale, k, gap, w = 2600.0, 1200.0, 40.0, 0.01, 4e5, 4e-4, 2 * np.pi * 5.0
 

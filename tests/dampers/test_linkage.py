@@ -118,6 +118,7 @@ def test_a_spring_stores_at_the_wheel_what_it_stores_itself():
         np.testing.assert_allclose(stored, (0.5 * 3e4 * travel_by_hand(x) - 500.0) * travel_by_hand(x), rtol=1e-10)
 
 
+@pytest.mark.slow
 def test_a_quarter_car_agrees_with_an_independent_solver():
     valve, lag, spring = PowerLaw(1500.0, 1.5, 900.0, 1.5, knee_width=0.1), 0.004, 6e3
     law = Linkage(valve + Lag(Linear(800.0), lag) + Spring(spring), TRAVEL, RATIO)
@@ -142,6 +143,7 @@ def test_a_quarter_car_agrees_with_an_independent_solver():
     assert errors[1] < 1e-5 and errors[1] < 0.35 * errors[0], errors
 
 
+@pytest.mark.slow
 def test_derivatives_with_respect_to_the_ratios_agree_with_differences():
     car = QuarterCar(300.0, 40.0, 20e3, 180e3, Linkage(Lag(Linear(1500.0), 0.004) + Spring(6e3), TRAVEL, RATIO))
     bump = roads.cosine_bump(0.05, start=0.0, duration=0.1)
@@ -186,6 +188,7 @@ def test_a_force_at_rest_moves_with_the_ratio():
     np.testing.assert_allclose(20e3 * x, 300.0 * ratio_by_hand(x), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_step_is_divided_for_the_largest_ratio():
     inner, largest = Lag(Linear(4e3), 0.004) + Linear(60e3), 1.5
 
@@ -200,6 +203,7 @@ def test_a_step_is_divided_for_the_largest_ratio():
     np.testing.assert_allclose(runs[0], runs[1][::10], atol=1e-4)
 
 
+@pytest.mark.slow
 def test_half_and_full_cars_that_only_heave_are_quarter_cars():
     law, start = Linkage(Lag(Linear(1500.0), 0.004) + Spring(6e3, -400.0), TRAVEL, RATIO), {"z_sprung": 0.07}
     corner = Corner(40.0, 20e3, 180e3, law)

@@ -46,6 +46,7 @@ def test_printed_equations_with_the_prototype(voltage):
     assert error[2] < error[0] / 4
 
 
+@pytest.mark.slow
 def test_with_a_stiff_dashpot_it_is_bouc_wen():
     one = last_cycle(ModifiedBoucWen(800.0, 1e11, 3000.0, 300.0, 1e-3, 0.6, 1.5), 4.0, 0.01, samples=300)[2]
     two = last_cycle(BoucWen(800.0, 3000.0, 300.0, 1e-3, 0.6, 1.5), 4.0, 0.01, samples=300)[2]
@@ -69,6 +70,7 @@ def test_voltage_changes_three_numbers():
     np.testing.assert_allclose(*after, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_stable_at_a_step_far_too_long():
     t = np.arange(200) * 0.05
     v = np.where(np.arange(200) % 20 < 10, 0.8, -0.8)

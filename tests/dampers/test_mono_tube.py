@@ -91,6 +91,7 @@ def test_against_balances_of_oil_and_gas(frequency, amplitude):
     assert errors[1] < errors[0] / 4
 
 
+@pytest.mark.slow
 def test_at_one_millisecond():
     """The step of simulations: RMS error relative to the peak force; a quarter of the step where cavities close."""
     for amplitude, substeps, limit in ((0.01, 1, 0.004), (0.02, 1, 0.04), (0.02, 4, 0.001)):
@@ -143,6 +144,7 @@ def test_passive_everywhere():
             assert work(frequency, v, force) > 0.0
 
 
+@pytest.mark.slow
 def test_no_drift():
     """A hundred cycles later the loop is the same to rounding."""
     w, t = 2 * np.pi * 12.0, np.arange(100 * 200 + 1) / (200 * 12.0)
@@ -221,6 +223,7 @@ def test_a_spring_cannot_be_put_in_series():
         SeriesSpring(LAW, 1e6)
 
 
+@pytest.mark.slow
 def test_single_precision():
     assert single_precision_error(MonoTube.reference) < 1e-3
 
@@ -270,6 +273,7 @@ def test_start_from_records_and_geometry():
         MonoTube.guess(*samples, piston_diameter=0.02, rod_diameter=0.03)
 
 
+@pytest.mark.slow
 def test_a_fit_takes_steps_that_resolve_the_front_of_the_force():
     """With steps of a whole sample the true law is 3.5 N beside this record, which biases its estimates."""
     frequency, samples = 12.0, 160

@@ -74,7 +74,7 @@ def test_no_jump_at_the_joints_and_zero_at_rest(rng):
 
 def test_segments_go_on_along_their_tangents(rng):
     law = random_law(rng)
-    slope = jax.grad(law.force_velocity)
+    slope = jax.jit(jax.grad(law.force_velocity))
     for end, side in ((-1.5, -1.0), (1.2, 1.0)):
         np.testing.assert_allclose(slope(end + 0.5 * side), slope(end - 1e-9 * side), rtol=1e-6)
         rise = law.force_velocity(end + 2.0 * side) - law.force_velocity(end)

@@ -91,6 +91,7 @@ def test_work_of_the_shock(shock):
     np.testing.assert_allclose(work(frequency, v, force), slopes * w * amplitude**2, rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_quarter_car():
     law = StrokeDependent((Linear(4000.0), Linear(1000.0), Linear(2500.0)), [-0.03, 0.0, 0.02])
 

@@ -72,7 +72,10 @@ def _sine(frequency, amplitude, samples):
 
 
 @pytest.mark.parametrize("intake", ["wide", "narrow"])
-@pytest.mark.parametrize(("frequency", "amplitude"), [(0.5, 0.05), (10.0, 0.005), (3.0, 0.03)])
+@pytest.mark.parametrize(
+    ("frequency", "amplitude"),
+    [*(pytest.param(*motion, marks=pytest.mark.slow) for motion in [(0.5, 0.05), (10.0, 0.005)]), (3.0, 0.03)],
+)
 def test_against_volumes_of_oil_and_gas(frequency, amplitude, intake):
     """With the narrow intake cavities open and close below the piston."""
     law = LAW if intake == "wide" else replace(LAW, SLOW_INTAKE)
@@ -112,6 +115,7 @@ def test_the_curve_of_paper_001():
     assert np.sqrt(np.mean((found - expected) ** 2)) < 0.005 * np.max(np.abs(expected))
 
 
+@pytest.mark.slow
 def test_the_base_valve_passes_what_the_rod_displaces():
     """Whatever area the base valve states: a fit may move that of the rod."""
     v = np.array([-0.07, -0.05, 0.05, 0.3])  # no cavity opens

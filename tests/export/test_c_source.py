@@ -54,7 +54,9 @@ def test_all_printed_laws_give_the_numbers_of_jax(tmp_path):
     check([name for name in LAWS if name not in PLAIN], tmp_path)
 
 
-@pytest.mark.parametrize(("command", "precision"), [("gcc", "float64"), ("g++", "float32")])
+@pytest.mark.parametrize(
+    ("command", "precision"), [("gcc", "float64"), pytest.param("g++", "float32", marks=pytest.mark.slow)]
+)
 def test_the_test_program_passes_and_fails(tmp_path, command, precision):
     files = to_c(
         Lag(Besinger(900.0, 2800.0, 700.0, 0.25, 0.05), 0.004), tmp_path, precision=precision, derivatives=True

@@ -127,7 +127,7 @@ def in_c(folder, vehicle, given, gain=0.0, begins=10**6):
     return names, outputs
 
 
-@pytest.mark.parametrize("name", ["skyhook", "bouc_wen"])
+@pytest.mark.parametrize("name", ["skyhook", pytest.param("bouc_wen", marks=pytest.mark.slow)])
 def test_the_controller_in_c_decides_as_in_a_simulation(tmp_path, name):
     """Also a hysteretic law: its copy, from measured motion alone, has the states of the law in the simulation."""
     run = driven(name)

@@ -84,6 +84,7 @@ def test_the_vehicle_as_fmu_is_that_of_simulate(files, tmp_path, name):
     np.testing.assert_array_equal(unit.run(channels, STEP), first)
 
 
+@pytest.mark.slow
 def test_a_gain_changed_during_a_run_of_a_vehicle(files, tmp_path):
     vehicle, surface = car("skyhook"), from_profile(TIME, heights(1))
     _, state = simulate(vehicle, surface, duration=0.102, dt=STEP, return_state=True)

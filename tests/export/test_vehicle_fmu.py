@@ -152,7 +152,7 @@ def test_fmu(files, tmp_path, name):
 
 
 @pytest.mark.exhaustive_cases("half-True", "half-False", "truck-True")
-@pytest.mark.parametrize("rates", [True, False])
+@pytest.mark.parametrize("rates", [pytest.param(True, marks=pytest.mark.slow), False])
 @pytest.mark.parametrize("name", [name for name in NAMES if name.values != ("tracked",)])
 def test_co_simulation_in_the_master_of_fmpy(files, name, rates):
     """Right after a step inputs and outputs are extrapolated: the error falls with the square of the step."""

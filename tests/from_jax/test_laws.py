@@ -32,6 +32,7 @@ def force():
     return respond(TRUE, TIME, STROKE, VELOCITY)
 
 
+@pytest.mark.slow
 def test_optimistix_fits_a_law_that_was_fitted_before(force):
     found = optx.least_squares(error, optx.LevenbergMarquardt(rtol=1e-9, atol=1e-9), FITTED, args=force)
     np.testing.assert_allclose(jax.tree.leaves(found.value), jax.tree.leaves(TRUE), rtol=1e-6)

@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
+import pytest
 
 from jaxdamp import identify, respond
 from jaxdamp.bench import BenchRun
@@ -25,6 +26,7 @@ def settled():
     return BenchRun("sine", TIME, stroke, velocity, force)
 
 
+@pytest.mark.slow
 def test_the_residual_of_a_problem_gives_the_truth_within_bounds_where_a_start_at_rest_does_not():
     run = settled()
     start = Lag(Linear(1000.0), 0.008)

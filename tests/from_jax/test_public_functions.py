@@ -17,6 +17,7 @@ def outcomes() -> dict[str, list[str]]:
     return json.loads(done.stdout)
 
 
+@pytest.mark.slow
 def test_every_public_function_of_numbers_is_called_with_a_traced_one(outcomes):
     missing = [name for name, calls in outcomes.items() if calls == ["no sample"]]
     assert not missing, f"tests/from_jax/traced_samples.py needs a sample for {missing}"
@@ -25,11 +26,13 @@ def test_every_public_function_of_numbers_is_called_with_a_traced_one(outcomes):
     assert len(outcomes) > 100 and sum(calls.count("traced") for calls in outcomes.values()) > 100
 
 
+@pytest.mark.slow
 def test_none_ends_in_an_error_of_jax(outcomes):
     raw = [f"{name}, call {i}: {call}" for name, calls in outcomes.items() for i, call in enumerate(calls)]
     assert not [line for line in raw if ": raw " in line]
 
 
+@pytest.mark.slow
 def test_a_refusal_names_the_argument_and_says_what_to_do(outcomes):
     refused = [call for calls in outcomes.values() for call in calls if call.startswith("refused")]
     assert len(refused) > 20

@@ -68,6 +68,7 @@ def test_what_cannot_be_computed_is_refused_in_a_sentence(call, said):
         call()
 
 
+@pytest.mark.slow
 def test_a_plain_vmap_drives_cars_side_by_side():
     ride = Ride(half_car_002(LINEAR), roads.iso8608("C", 20.0, 1.0, seed=1), metrics=[RMS], duration=0.2)
     wide, point = ride.side_by_side(), {"sprung_mass": jnp.asarray([600.0, 700.0])}
@@ -135,6 +136,7 @@ np.testing.assert_allclose(slopes, jax.jit(jax.vmap(jax.grad(lift)))(rates), rto
 """
 
 
+@pytest.mark.slow
 def test_runs_are_spread_over_devices_by_shard_map():
     flags = f"{os.environ['XLA_FLAGS']} --xla_force_host_platform_device_count=2"
     env = os.environ | {"XLA_FLAGS": flags, "JAX_PLATFORMS": "cpu"}

@@ -53,7 +53,9 @@ def ride(law, **options):
     return Ride(quarter_car_000(law), ROAD, metrics=[RMS], duration=0.2, **options)
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in ("friction", "LuGre"))) for name in LAWS]
+)
 def test_steps_are_divided_alike_however_a_number_is_traced(name):
     make, start, expected = LAWS[name]
     assert ride(make(start)).substeps == expected

@@ -79,6 +79,7 @@ def test_a_drift_is_found_and_a_mended_cause_ends_the_signals():
     assert found.false_alarms == pytest.approx(800 * rates)
 
 
+@pytest.mark.slow
 def test_a_line_of_fitted_dampers_is_charted_as_it_grows(tmp_path):
     def made(i):
         law = Bilinear(2000.0 + (150.0 if i == 35 else 0.0) + 7.0 * np.sin(12.9898 * i**2), 1200.0)

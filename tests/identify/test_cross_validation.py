@@ -106,6 +106,7 @@ def test_records_without_a_group_values_per_record_and_bad_records(runs):
     assert weighed["rate"].value == same["rate"].value and weighed.runs == same.runs
 
 
+@pytest.mark.slow
 def test_records_of_one_name_are_told_apart(runs):
     more = VirtualDyno(Lag(Bilinear(2600.0, 1200.0), 0.004), sampling_rate=400.0, force_noise=10.0, seed=1)
     again = list(more.run([SineTest(0.01, f, cycles=3) for f in (1.0, 3.0)]))

@@ -73,6 +73,7 @@ def test_a_state_that_its_record_does_not_tell_keeps_what_is_expected():
     assert any("keeps the value that is expected" in warning for warning in told.warnings)
 
 
+@pytest.mark.slow
 def test_a_record_cut_out_of_a_motion_begins_with_any_state():
     """A slow lag: without the first half cycle, which is not compared otherwise, its time is wrong by a fifth."""
     long = VirtualDyno(Lag(Linear(2000.0), 0.5), sampling_rate=200.0).run(SineTest(0.02, 2.0, cycles=12))[0]

@@ -61,6 +61,7 @@ def test_the_optimum_is_that_of_single_fits(clicks, start, options):
         assert float(get(many.rigs[i], "gas_force")) == pytest.approx(-80.0, abs=2.0)
 
 
+@pytest.mark.slow
 def test_records_cut_out_of_a_long_motion_start_in_the_periodic_solution():
     laws = [Lag(Linear(2000.0), 0.5), Lag(Linear(2300.0), 0.4)]
     made = [VirtualDyno(law, sampling_rate=200.0).run(SineTest(0.02, 2.0, cycles=12)) for law in laws]

@@ -101,6 +101,7 @@ def test_many_dampers_have_the_gas_at_the_pressures_that_their_records_state(run
             assert float(get(many[name], path)) == pytest.approx(float(get(single.law, path)), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_number_that_the_pressure_changes_has_a_value_for_each():
     frictions = (20.0, 30.0, 45.0)
     dampers = [replace(DAMPER, {"friction_force": friction}) for friction in frictions]

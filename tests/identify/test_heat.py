@@ -89,6 +89,7 @@ def test_a_fitted_record_is_predicted_by_its_own_values(each, runs):
     assert each.score(runs[2])[1] < 1.1 * NOISE
 
 
+@pytest.mark.slow
 def test_held_out_records_say_that_heat_helps(runs, hot):
     laws = {"cold": BEGIN.law, "heated": BEGIN}
     comparison = compare(laws, runs, per_record=["initial_rise"], **HOW)  # the machine has one too
@@ -168,6 +169,7 @@ def test_a_scaled_law_takes_one_temperature_a_record_a_channel_or_its_own():
     assert result.score(other)[1] > 30.0 and result.score(warm(40.0, 2.0, 2))[1] < 6.0  # its own is 40 °C
 
 
+@pytest.mark.slow
 def test_a_machine_that_tells_heat_begins_with_the_stated_temperature_too():
     machine = Rig(temperature_slope=0.004, heating=1 / 400, cooling=1 / 300)
     damper = Bilinear(2600.0, 1500.0)

@@ -66,7 +66,11 @@ def test_laws_with_states_are_identified_from_few_cycles(law, tests, frozen):
         assert abs(e.value - value) < 3.5 * e.standard_error, e
 
 
-@pytest.mark.parametrize("law", [SLOW_LAG, BoucWen(1500.0, 2000.0, 120.0, 0.005)], ids=["lag", "Bouc-Wen"])
+@pytest.mark.parametrize(
+    "law",
+    [SLOW_LAG, pytest.param(BoucWen(1500.0, 2000.0, 120.0, 0.005), marks=pytest.mark.slow)],
+    ids=["lag", "Bouc-Wen"],
+)
 def test_the_periodic_solution_is_that_after_many_cycles_and_so_are_its_derivatives(law):
     phase = jnp.linspace(0.0, 2.0 * jnp.pi, 101) + 0.3
     motion = Cycle(jnp.asarray(5e-3), 0.005 * jnp.sin(phase), 0.005 * 4 * jnp.pi * jnp.cos(phase), jnp.asarray(True))

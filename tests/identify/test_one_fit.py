@@ -38,7 +38,7 @@ def ride():
     return identify.virtual_ride(CAR, sweep, {"stroke": 1e-4}, sampling_rate=100.0, finer=4, seed=2)
 
 
-@pytest.fixture(scope="module", params=["law", "vehicle", "targets"])
+@pytest.fixture(scope="module", params=["law", pytest.param("vehicle", marks=pytest.mark.slow), "targets"])
 def fitted(request, runs, ride):
     """A fit of two rates from a start away from the truth, as a function of the options."""
     if request.param == "law":

@@ -18,7 +18,7 @@ from jaxdamp.rig import Rig, printed as printed_laws
 
 TRUTH = LuGre.guess(np.array([-0.3, 0.0, 0.3]), np.array([-600.0, 100.0, 900.0])) + Linear(1500.0) + Spring(2000.0)
 TESTS = [SineTest(0.01, 2.0, cycles=2), SineTest(0.02, 2.0, cycles=2), SineTest(0.02, 4.0, cycles=3)]
-PLAIN = ("piecewise_linear", "besinger_lag", "besinger_series_spring", "table")
+PLAIN = ("piecewise_linear", "besinger_lag", "table")
 THINNED = "thinned_visco_plastic"
 LAWS = [pytest.param(n, marks=() if n in PLAIN else pytest.mark.slow) for n in (*identify.LAWS, THINNED)]
 
@@ -44,8 +44,10 @@ LATE = Rig(force_delay=1.3e-3)
 EARLY = Rig(force_delay=-2.7e-3, moving_mass=2.0, force_lag=3e-3, gas_force=-100.0, stroke_offset=1e-3)
 MACHINES = [
     ("besinger", LATE),
-    ("besinger_lag", EARLY),
-    *(pytest.param(name, EARLY, marks=pytest.mark.slow) for name in ("besinger_series_spring", "lugre_spring")),
+    *(
+        pytest.param(name, EARLY, marks=pytest.mark.slow)
+        for name in ("besinger_lag", "besinger_series_spring", "lugre_spring")
+    ),
     pytest.param("piecewise_linear", Rig(moving_mass=2.0, force_lag=1e-7), marks=pytest.mark.slow),
 ]
 
@@ -101,7 +103,10 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case",
+    [pytest.param(case, marks=[pytest.mark.slow] * (case in ("tied", "a delay for each record"))) for case in CASES],
+)
 def test_a_fit_has_the_standard_errors_of_xla(case, without_c, monkeypatch) -> None:
     truth = Lag(Besinger(1600.0, 1600.0, 900.0, 0.13, 0.05), 0.004)
     runs = VirtualDyno(truth, sampling_rate=400.0, force_noise=10.0).run(TESTS[1:])
@@ -156,6 +161,7 @@ def test_what_was_changed_on_disk_is_not_loaded(tmp_path, monkeypatch) -> None:
         _native.library.__wrapped__(text)
 
 
+@pytest.mark.slow
 def test_a_second_ladder_of_other_records_compiles_next_to_nothing(runs) -> None:
     """Of a first one all programs but a few are single operations; the laws themselves are C."""
     names = ["piecewise_linear", "besinger_lag"]

@@ -164,7 +164,7 @@ def test_a_profile_goes_on_along_a_condition_of_the_law():
     np.testing.assert_allclose(curve.cost, rises / result.rmse**2, rtol=0.02, atol=0.02)
 
 
-@pytest.mark.parametrize("rig", [None, "offset"])
+@pytest.mark.parametrize("rig", [None, pytest.param("offset", marks=pytest.mark.slow)])
 def test_a_band_from_the_printed_program_is_that_of_jax(sines, rig):
     runs = sines(SeriesSpring(Bilinear(2000.0, 1200.0), 3e5), noise=5.0, tests=[(0.02, 0.5), (0.02, 3.0)])
     result = fit(SeriesSpring(Bilinear(1500.0, 1500.0), 2e5), runs, rig=rig)

@@ -55,6 +55,7 @@ def test_refits_from_the_common_optimum_are_those_from_the_start(law):
     assert rung.judged_on.endswith("velocities that no other reaches by the fit of all")
 
 
+@pytest.mark.slow
 def test_velocities_that_one_record_alone_reaches_count_too():
     truth = SeriesSpring(PiecewiseLinear([-0.3, -0.08, 0.08, 0.3], [4300.0, 530.0, 770.0, 870.0, 2700.0]), 4.1e5)
     tests = [SineTest(0.004, 1.8, cycles=4), SineTest(0.006, 0.9, cycles=4), SineTest(0.024, 4.0, cycles=8)]

@@ -76,7 +76,7 @@ def ride_with(law, **options):
     return lambda law: dict(ride.of_vehicle(quarter_car_000(law))())
 
 
-@pytest.mark.parametrize("weighting", ["samples", "runs"])
+@pytest.mark.parametrize("weighting", ["samples", pytest.param("runs", marks=pytest.mark.slow)])
 def test_a_law_linear_in_its_parameters(weighting):
     runs = records(dampers.Bilinear(2600.0, 1400.0) + dampers.Spring(3000.0))
     result = identify.fit(dampers.Linear(1500.0) + dampers.Spring(2000.0), runs, weighting=weighting)
@@ -112,15 +112,20 @@ def test_what_is_no_smooth_minimum_of_squares_is_refused():
     expected = identify.fit(dampers.Linear, runs, priors={"rate": (1500.0, 10.0)})
     with pytest.raises(ValueError, match="is one by priors rate 1500 ± 10"):
         expected.sensitivity_to_records(lambda law: law.rate)
+    fine = identify.fit(dampers.Linear, runs)
+    with pytest.raises(ValueError, match=r"`function` must give one number as 'value', but is of shape \(2,\)"):
+        fine.sensitivity_to_records(lambda law: jnp.stack([law.rate, law.rate]))
+
+
+@pytest.mark.slow
+def test_a_fit_from_periodic_states_is_one_by_plain_least_squares():
+    runs = records(dampers.Bilinear(2600.0, 1400.0))
     periodic = identify.fit(dampers.Lag(dampers.Linear(900.0), 0.004), runs, initial_state="periodic")
-    assert "periodic" in periodic.criterion  # which is still plain least squares
+    assert "periodic" in periodic.criterion
     by_gain = periodic.sensitivity_to_records(lambda law: law.law.rate).by_gain["value"]
     assert by_gain.sum() == pytest.approx(
         float(parameters.get(periodic.law, "law.rate")), rel=1e-3
     )  # all forces grow alike
-    fine = identify.fit(dampers.Linear, runs)
-    with pytest.raises(ValueError, match=r"`function` must give one number as 'value', but is of shape \(2,\)"):
-        fine.sensitivity_to_records(lambda law: jnp.stack([law.rate, law.rate]))
 
 
 @pytest.mark.slow

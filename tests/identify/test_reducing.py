@@ -187,6 +187,7 @@ def test_a_law_left_aside_for_its_doubt_is_made_simpler_where_it_predicts_better
     assert [rung.name for rung in recommended(1.05)] == ["friction_lag_reduced"] and recommended(1.01) == []
 
 
+@pytest.mark.slow
 def test_every_plainer_law_has_fewer_numbers_and_about_the_force():
     """Of all laws of the contract; in steady sliding at the largest velocity, where friction has given."""
     found = set()

@@ -67,7 +67,7 @@ def of_arbitrary_numbers(runs):
     return Scaled(Linear(800.0 / factor), factor)
 
 
-@pytest.mark.parametrize("settings", [(0.0, 2.0), (0.0, 1.0, 2.0)])
+@pytest.mark.parametrize("settings", [(0.0, 2.0), pytest.param((0.0, 1.0, 2.0), marks=pytest.mark.slow)])
 def test_forces_are_blended_where_the_numbers_of_the_settings_do_not_belong_together(runs, settings):
     some = [run for run in runs if run.command in settings]
     found = identify.fit_scheduled(of_arbitrary_numbers, some, freeze=["factor"])
@@ -111,6 +111,7 @@ def test_a_comparison_of_laws_that_depend_on_the_setting(runs):
     assert "bilinear interpolated to 1" in comparison.verdict[-1]
 
 
+@pytest.mark.slow
 def test_the_laws_alone_are_judged_from_the_states_that_they_were_fitted_with():
     """Twelve cycles on, cut in motion: from rest a lag of half a second is far off."""
     runs = []

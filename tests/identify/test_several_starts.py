@@ -64,6 +64,7 @@ def test_a_bad_instance_ends_where_the_truth_does(first_records):
         fit(BAD, first_records, starts=0)
 
 
+@pytest.mark.slow
 def test_the_best_of_several_starts_is_followed_to_its_end(monkeypatch):
     monkeypatch.setattr(several, "FIRST_LOOK", 3)
     monkeypatch.setattr(several, "FOLLOWED_STEPS", 1)

@@ -27,6 +27,7 @@ def apart(one, other):
     return max(abs(a.value - b.value) / a.standard_error for a, b in pairs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", [optx.Dogleg(**HOW), optx.BFGS(**HOW)], ids=["dogleg", "bfgs"])
 @pytest.mark.exhaustive_cases("bfgs")
 def test_a_law_with_conditions_by_another_solver(sines, solver):

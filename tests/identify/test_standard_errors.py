@@ -55,6 +55,7 @@ def record(noise):
     return BenchRun("record", time, stroke, velocity, 2000.0 * velocity + noise)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("memory", [0.0, 0.95])
 @pytest.mark.exhaustive_cases("0.0")
 def test_errors_cover_the_scatter_whether_noise_is_alike_or_not(memory):
@@ -139,6 +140,7 @@ def test_a_knot_between_equal_slopes_is_not_identifiable(sines):
     assert len(told) == 1 and told[0].endswith("the curve hardly bends there. Take one with fewer knots.")
 
 
+@pytest.mark.slow
 def test_all_certain_numbers_are_moved_away(monkeypatch):
     """Of a law with many numbers in doubt, not only the first: each search ends where it gains nothing more."""
     law = LuGre.guess(np.array([-0.3, 0.0, 0.3]), np.array([-600.0, 100.0, 900.0])) + Linear(1500.0) + Spring(2000.0)

@@ -56,6 +56,7 @@ def test_law_and_lag_from_a_start_away_from_the_truth(varying):
     assert without.rmse > 1.5 * result.rmse  # what a fit without the lag misses
 
 
+@pytest.mark.slow
 def test_records_at_held_levels_and_varying_ones_together(varying, held):
     result = identify.fit(START, [*held, *varying], rig=Rig(command_lag=2e-3))
     assert all(within(e, true) for e, true in zip(result.parameters, [*TRUE, LAG], strict=True))
@@ -73,7 +74,10 @@ def test_settings_and_varying_records_become_one_law(varying, held):
         identify.fit_scheduled(Bilinear, varying)
 
 
-@pytest.mark.parametrize("initial_state", ["warm_up", "rest", "periodic", "estimated"])
+@pytest.mark.parametrize(
+    "initial_state",
+    ["rest", "periodic", *(pytest.param(how, marks=pytest.mark.slow) for how in ("warm_up", "estimated"))],
+)
 def test_a_law_with_states_follows_the_command_however_it_starts(initial_state):
     law = Scheduled((Lag(Linear(600.0), 0.006), Lag(Linear(2400.0), 0.006)), [0.0, 1.0], 0.0)
     start = Scheduled((Lag(Linear(900.0), 0.003), Lag(Linear(1500.0), 0.003)), [0.0, 1.0], 0.0)

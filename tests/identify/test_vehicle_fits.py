@@ -276,6 +276,7 @@ def test_a_channel_in_another_unit_is_named(record, size):
     )
 
 
+@pytest.mark.slow
 def test_numbers_of_sensors_need_no_tangents_through_the_vehicle(record):
     """The columns of sensors are derivatives of what the simulation gave, and those of the vehicle do not change."""
     sensors = {"stroke": Sensor(offset=1e-3, gain=1.1), "sprung_acceleration": Sensor(offset=0.1, lag=2e-3)}

@@ -26,7 +26,7 @@ def test_step_equals_scipy(weighting, rng):
     np.testing.assert_allclose(result, expected, atol=1e-11)
 
 
-@pytest.mark.parametrize("weighting", ["Wd", "Wf", "Wk"])
+@pytest.mark.parametrize("weighting", [pytest.param("Wd", marks=pytest.mark.slow), "Wf", "Wk"])
 def test_spectrum_equals_the_differential_equation(weighting):
     # the third form, as an engine would carry it: states joined to an ODE, driven by the continuous burst
     a, b, c, _ = (np.asarray(part) for part in weighting_state_space(weighting))

@@ -42,7 +42,10 @@ def test_the_page_holds_the_heights_and_forces_of_the_response(half_car, tmp_pat
     assert design["speed"] == 15.0
 
 
-@pytest.mark.parametrize("make", [presets.full_car_jazar, presets.m113_003, presets.truck_001])
+@pytest.mark.parametrize(
+    "make",
+    [presets.full_car_jazar, *(pytest.param(m, marks=pytest.mark.slow) for m in (presets.m113_003, presets.truck_001))],
+)
 def test_every_damper_and_wheel_is_drawn(make, tmp_path):
     car = make()
     run = simulate(car, ROAD, duration=0.2)

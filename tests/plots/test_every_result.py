@@ -106,6 +106,10 @@ def test_figures_say_what_they_show(runs: BenchSet) -> None:
     assert titles(plots.force_velocity(law, runs=list(runs)[:1])) == ["Force over velocity: bilinear, 0.5Hz"]
     assert titles(plots.force_velocity({"a": law}, runs=list(runs))) == ["Force over velocity: 3 records"]
     assert titles(plots.force_velocity(law, title="Twin")) == ["Twin"]
-    pair = {"A": law, "B": Bilinear(3000.0, 1500.0)}
+
+
+@pytest.mark.slow
+def test_a_figure_of_compared_dampers_says_what_it_shows() -> None:
+    pair = {"A": Bilinear(2600.0, 1200.0), "B": Bilinear(3000.0, 1500.0)}
     compared = tune.compare_dampers(pair, vehicles.presets.quarter_car_000, roads.white("C", 20.0))
     assert titles(compared.plot()) == ["Ride metrics beside those of A, on a white road"]

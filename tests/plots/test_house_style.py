@@ -97,6 +97,7 @@ def test_colours_of_a_dark_page_differ_for_everybody() -> None:
             assert min(float(np.linalg.norm(a - b)) for a, b in itertools.combinations(seen, 2)) > 15.0
 
 
+@pytest.mark.slow
 def test_a_sheet_of_a_controlled_car_shows_its_damper_at_all_levels() -> None:
     damper = Scheduled((Linear(300.0), Linear(900.0), Linear(3900.0)), levels=[0.0, 1.0, 2.0], command=0.0)
     car = Controlled(QuarterCar(400.0, 50.0, 20e3, 250e3, damper), Skyhook())

@@ -217,10 +217,10 @@ def test_the_result_plots_itself(tuned: TuneResult) -> None:
 # ---- all
 
 
+@pytest.mark.slow
 def test_nothing_of_matplotlib_is_loaded_before_a_plot_is_drawn() -> None:
     code = (
-        "import sys, jaxdamp.plots, jaxdamp.report\n"
-        "assert 'matplotlib' not in sys.modules\n"
+        "import sys, jaxdamp.plots, jaxdamp.report\nassert 'matplotlib' not in sys.modules\n"
         "from jaxdamp.dampers import Linear\n"
         "jaxdamp.plots.force_velocity(Linear(1.0))\n"
         "assert 'matplotlib.figure' in sys.modules and 'matplotlib.pyplot' not in sys.modules"

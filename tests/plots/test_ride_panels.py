@@ -34,6 +34,7 @@ def test_gains_of_a_linear_car_are_those_of_its_frequency_response(responses: di
         np.testing.assert_allclose(gain[inside], exact[inside], rtol=0.12)
 
 
+@pytest.mark.slow
 def test_each_damper_of_a_full_car_has_its_own_velocity() -> None:
     road = roads.iso8608("C", speed=20.0, length=100.0, seed=1)
     ride = simulate(full_car_jazar(Bilinear(1500.0, 900.0)), road, duration=2.0)

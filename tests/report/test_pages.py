@@ -145,6 +145,7 @@ def test_a_page_on_the_whole_chain(comparison: Comparison, rides: dict[str, Resp
     ]
 
 
+@pytest.mark.slow
 def test_the_part_on_laws_may_come_from_another_process(
     comparison: Comparison, rides: dict[str, Response], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -210,6 +211,7 @@ def test_a_page_on_a_tuning_beside_another_vehicle(tuned: TuneResult) -> None:
         tuning_report(tuned, baseline=vehicles.presets.half_car_002())
 
 
+@pytest.mark.slow
 def test_a_page_on_a_tuning(rides: dict[str, Response], tuned: TuneResult) -> None:
     bump = roads.cosine_bump(0.05, start=0.1, duration=0.2)
     fresh = tune.rescore(tuned, [bump], duration=1.0, dt=0.002)

@@ -76,7 +76,7 @@ def errors_beside_scipy(law_at, law, command):
     return found
 
 
-@pytest.mark.parametrize("blend", ["parameters", "force"])
+@pytest.mark.parametrize("blend", ["parameters", pytest.param("force", marks=pytest.mark.slow)])
 def test_a_law_with_states_agrees_with_an_independent_integrator(blend):
     soft, hard = BoucWen(500.0, 1000.0, 60.0, 1e-3), BoucWen(1800.0, 1000.0, 400.0, 1.5e-3)
     law = Scheduled((soft, hard), [0.0, 1.0], 0.3, blend)
@@ -84,6 +84,7 @@ def test_a_law_with_states_agrees_with_an_independent_integrator(blend):
     assert errors[0] < 5e-5 and errors[0] / errors[1] > 3.0 and errors[2] < 5e-6
 
 
+@pytest.mark.slow
 def test_a_voltage_of_a_law_of_its_own_and_pieces_of_a_record():
     law, volts = ModifiedBoucWen.prototype(), 1.0 + np.sin(9.0 * TIME)
     whole = respond(law, TIME, STROKE, VELOCITY, command=volts, state=law.initial_state())

@@ -12,7 +12,7 @@ CLASS_C, N0, LOW, HIGH = 256e-6, 0.1, 0.011, 2.83
 VARIANCE = CLASS_C * N0**2 * (1 / LOW - 1 / HIGH)  # integral of G_d(n0) (n/n0)^-2
 
 
-@pytest.mark.parametrize("length", [1000.0, 12_000.0])
+@pytest.mark.parametrize("length", [1000.0, pytest.param(12_000.0, marks=pytest.mark.slow)])
 def test_equals_the_plain_sum_of_cosines(length):
     # few times are summed, many interpolated after a Fourier transform
     road = iso8608("C", 20.0, seed=4, ramp=0.0, length=length)
@@ -92,6 +92,7 @@ def body_acceleration(frequency):
     return np.abs(s**2 * np.linalg.solve(matrix, np.array([[0.0], [tyre]]) * np.ones((s.size, 1, 1)))[:, 0, 0])
 
 
+@pytest.mark.slow
 def test_the_rms_of_a_run_scatters_over_seeds_as_that_of_a_gaussian_road():
     """The share p_i of each line is exponentially distributed: std of the RMS sqrt(sum p_i^2)/2, 2.3 % here."""
     road = iso8608("C", 20.0, seed=0, amplitudes="fixed")
@@ -142,7 +143,7 @@ def test_velocity_density_is_constant():
     assert float(slope) == pytest.approx(4 * np.pi**2 * N0**2 * CLASS_C * (HIGH - LOW), rel=2e-3)
 
 
-@pytest.mark.parametrize("amplitudes", ["fixed", "random"])
+@pytest.mark.parametrize("amplitudes", [pytest.param("fixed", marks=pytest.mark.slow), "random"])
 def test_kurtosis_over_seeds_is_the_stated_one(amplitudes):
     road = iso8608("C", 20.0, seed=0, amplitudes="fixed")
     share = np.asarray(road.amplitude**2 / jnp.sum(road.amplitude**2))

@@ -75,6 +75,7 @@ def test_neither_track_leads():
     assert abs(changes - 0.5) < 4 * 0.5 / np.sqrt(n.size)
 
 
+@pytest.mark.slow
 def test_coherence_estimated_from_samples_is_gamma_squared():
     # 4 km in half-overlapped segments of 64 m: about 4000/64 * 1.9 = 118 independent averages
     spacing, segment, averages = 0.2, 320, 118
@@ -101,7 +102,9 @@ def test_seeds_reproduce_and_differ():
     assert np.max(np.abs(one[:, 1] - other[:, 1])) > 1e-4
 
 
-@pytest.mark.parametrize("argument", ["track_width", "speed", "waviness"])
+@pytest.mark.parametrize(
+    "argument", ["track_width", *(pytest.param(name, marks=pytest.mark.slow) for name in ("speed", "waviness"))]
+)
 def test_gradients_equal_differences(argument, check_gradient):
     given = {"track_width": 1.5, "speed": 20.0, "waviness": 2.1}
     time = jnp.linspace(0.0, 1.0, 41)

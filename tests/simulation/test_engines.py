@@ -114,6 +114,7 @@ def test_the_road_and_its_rate_are_straight_over_the_steps_between_two_instants(
 # ---- rides
 
 
+@pytest.mark.slow
 def test_a_ride_by_the_adaptive_engine_is_its_run():
     """Windows, weightings, gathered terms and whole records, of two axles."""
     road = roads.delayed(BUMP, positions=[0.0, 0.2], speed=20.0)
@@ -129,6 +130,7 @@ def test_a_ride_by_the_adaptive_engine_is_its_run():
         np.testing.assert_allclose(found[name], value, rtol=1e-9, err_msg=name)
 
 
+@pytest.mark.slow
 def test_an_engine_of_ones_own_with_a_memory_converges_in_a_run_and_a_ride():
     exact = simulate(CAR, BUMP, duration=0.1, dt=2e-3, engine=Adaptive())
     engines = [AdamsBashforth(substeps) for substeps in (8, 16)]
@@ -198,7 +200,7 @@ def test_the_layout_is_chosen_when_a_ride_is_made_whatever_the_environment_says_
 def test_all_layouts_give_the_same_ride():
     values = []
     for layout in MemoryLayout:
-        ride = Ride(CAR, BUMP, duration=0.05)
+        ride = Ride(CAR, BUMP, metrics=[RMS, "working_space_rms"], duration=0.05)
         object.__setattr__(ride, "layout", layout)
         values.append(list(ride().values()))
     np.testing.assert_allclose(values[1:], [values[0]] * 2, rtol=1e-9, atol=1e-12)

@@ -27,7 +27,10 @@ CARS = {
 }
 
 
-@pytest.mark.parametrize("name", CARS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] * (name not in ("extrapolated states",))) for name in CARS],
+)
 def test_parts_are_the_whole_to_rounding(name):
     car = CARS[name]
     whole = simulate(car, ROAD, duration=0.2, every=2)
@@ -43,6 +46,7 @@ def test_parts_are_the_whole_to_rounding(name):
         np.testing.assert_allclose(here, there, rtol=1e-11)
 
 
+@pytest.mark.slow
 def test_parts_of_other_steps_and_other_numbers_agree_as_well_as_the_steps_do():
     whole = simulate(LAG, ROAD, duration=0.2)["stroke"]
     _, state = simulate(LAG, ROAD, duration=0.1, return_state=True)
@@ -64,6 +68,7 @@ def test_a_solver_goes_on_within_its_tolerances():
     np.testing.assert_allclose(second.motion, whole.motion[50:], atol=1e-7 * np.abs(whole.motion).max())
 
 
+@pytest.mark.slow
 def test_parts_go_on_in_a_scan_in_a_batch_and_with_derivatives():
     def last(rate):
         car = presets.quarter_car_000(Lag(Linear(rate), 0.004))

@@ -28,22 +28,25 @@ def oscillator(law: dampers.AbstractDamper, damping: float = 0.0) -> LumpedVehic
     return LumpedVehicle(Frame((body,), (), (Wheel("", body.at(), RATE, damping, elements=(Element("law", law),)),)))
 
 
-def test_linear_vehicles_have_the_frequency_response_in_closed_form() -> None:
+@pytest.mark.parametrize(
+    ("car", "speed"), [(quarter_car_000(), None), pytest.param(half_car_002(), 12.0, marks=pytest.mark.slow)]
+)
+def test_linear_vehicles_have_the_frequency_response_in_closed_form(car: Any, speed: float | None) -> None:
     """With the delay between two axles, amplitude by amplitude."""
-    for car, speed in ((half_car_002(), 12.0), (quarter_car_000(), None)):
-        result = harmonic_response(car, FREQUENCY, np.array([[0.01], [0.03]]), speed=speed, substeps=32)
-        exact = vehicles.frequency_response(car, FREQUENCY, speed=speed)
-        assert all(status is Status.CONVERGED for status in result.status)
-        for channel, gain in exact.items():
-            scale = np.abs(gain).max()
-            error = np.abs(np.asarray(result.gain(channel)) - np.asarray(gain)).max()
-            assert error < 1e-8 * scale, channel
-            assert np.nanmax(np.asarray(result.distortion(channel))) < 1e-8
-    poles = np.linalg.eigvals(np.asarray(vehicles.linearise(quarter_car_000()).state_matrix))
+    result = harmonic_response(car, FREQUENCY, np.array([[0.01], [0.03]]), speed=speed, substeps=32)
+    exact = vehicles.frequency_response(car, FREQUENCY, speed=speed)
+    assert all(status is Status.CONVERGED for status in result.status)
+    for channel, gain in exact.items():
+        scale = np.abs(gain).max()
+        error = np.abs(np.asarray(result.gain(channel)) - np.asarray(gain)).max()
+        assert error < 1e-8 * scale, channel
+        assert np.nanmax(np.asarray(result.distortion(channel))) < 1e-8
+    poles = np.linalg.eigvals(np.asarray(vehicles.linearise(car).state_matrix))
     largest = np.abs(np.exp(poles[:, None] / FREQUENCY)).max(axis=0)
     np.testing.assert_allclose(np.abs(result.multipliers[..., 0]), [largest, largest], rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_same_by_shooting_with_scipy() -> None:
     """Friction and a hardening spring, by an independent formula of the car."""
     frequency, amplitude = 1.4, 0.015
@@ -70,6 +73,7 @@ def test_the_same_by_shooting_with_scipy() -> None:
     np.testing.assert_allclose(result["stroke"][0], motion[0] - motion[1], atol=3e-6 * np.ptp(motion[0]))
 
 
+@pytest.mark.slow
 def test_coulomb_friction_as_in_the_solution_of_den_hartog() -> None:
     """Amplitude of the deflection on a ground that moves with P/m ω²: motion without stops."""
     ratio, share = np.array([0.6, 0.75, 1.25, 1.6]), 0.4  # ω/ω_n, friction over P
@@ -113,14 +117,21 @@ def test_a_hardening_spring_jumps_where_duffing_says() -> None:
     assert np.asarray(result.distortion("stroke")).max() == pytest.approx(third, rel=0.05)
 
 
+def response(values: Any) -> Any:
+    """The largest gain of three by friction and amplitude."""
+    car = quarter_car_000(Linear(1200.0) + CoulombFriction(values[0], 0.02))
+    return jnp.max(jnp.abs(harmonic_response(car, [0.9, 1.0, 1.1], values[1], substeps=2).gain("z_sprung")))
+
+
+def test_slopes_are_those_of_differences() -> None:
+    derived, at, h = jax.jit(jax.value_and_grad(response)), np.array([60.0, 0.01]), np.array([1e-3, 1e-6])
+    differences = [float(derived(at + step)[0] - derived(at - step)[0]) / (2 * step.max()) for step in np.diag(h)]
+    np.testing.assert_allclose(derived(at)[1], differences, rtol=1e-5)
+
+
+@pytest.mark.slow
 def test_derivatives_are_those_of_differences() -> None:
     """Reverse, forward and second ones, by friction and amplitude."""
-    frequency = np.array([0.9, 1.0, 1.1])
-
-    def response(values: Any) -> Any:
-        car = quarter_car_000(Linear(1200.0) + CoulombFriction(values[0], 0.02))
-        return jnp.max(jnp.abs(harmonic_response(car, frequency, values[1], substeps=2).gain("z_sprung")))
-
     # One program: value and reverse slopes, and along each axis the forward slope and the change of the reverse ones.
     derived = jax.jit(
         lambda at: jax.vmap(lambda axis: jax.jvp(jax.value_and_grad(response), (at,), (axis,)))(jnp.eye(2))
@@ -137,14 +148,11 @@ def test_derivatives_are_those_of_differences() -> None:
 def test_what_is_not_steady_is_not_a_number() -> None:
     """A motion that grows is marked as unstable; arguments that mean nothing are refused."""
     frequency = np.array([0.9, 1.2])
-    growing = harmonic_response(
-        quarter_car_000(dampers.Scaled(Linear(100.0), -1.0, allow_active=True)), frequency, 0.01
-    )
+    push = dampers.Scaled(Linear(2.0), -1.0, allow_active=True)
+    growing = harmonic_response(oscillator(CubicSpring(10.0, 0.0) + push), [8.0], 0.01, substeps=4)
     assert set(growing.status) == {Status.UNSTABLE}
     assert "unstable" in growing.warnings[0]
-    away = oscillator(
-        CubicSpring(-400.0, 0.0) + dampers.Scaled(Linear(2.0), -1.0, allow_active=True)
-    )  # it leaves its well
+    away = oscillator(CubicSpring(-400.0, 0.0) + push)  # it leaves its well
     lost = harmonic_response(away, [3.18], 2.0, substeps=4)
     assert lost.status == (Status.NOT_STEADY,)
     assert not lost.converged

@@ -39,6 +39,7 @@ def test_a_truck_whose_tyres_pull_says_so_and_one_whose_tyres_lift_does_not():
         assert -1.0 - 1e-9 < relative.min() < -0.999
 
 
+@pytest.mark.slow
 def test_a_tracked_hull_lifts_with_spring_and_damper_together():
     """Without a mass between, a wheel in the air carries nothing: the forces on the hull are its weight at least."""
     lifting = over_a_bump(presets.m113_003(tyre_lifts=True), 0.25)

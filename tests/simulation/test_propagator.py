@@ -62,6 +62,7 @@ def test_a_vehicle_at_rest_stays():
     np.testing.assert_allclose(p.phi @ start + p.road_held @ jnp.array([0.3]), start, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_batches_and_derivatives_pass_through():
     car = quarter_car_000()
 

@@ -93,6 +93,7 @@ def test_a_range_changes_no_number_and_compiles_nothing_anew():
         np.testing.assert_array_equal(response.port_force, plain.port_force)
 
 
+@pytest.mark.slow
 def test_inside_compiled_code_nothing_is_said():
     def peak(rate):
         car, road = half_car(with_fitted_range(Linear(rate), SLOW))

@@ -66,6 +66,7 @@ def test_a_run_saved_with_stride_is_every_so_many_th_instant_of_the_run(engine):
     assert abs(float(parts["error"])) < 0.05 * float(parts["road_work"])
 
 
+@pytest.mark.slow
 def test_energies_of_a_run_saved_with_stride_are_estimates_of_the_same():
     """Of dampers at the road, whose rate is not its slope over a stride."""
     road = roads.iso8608("C", speed=15.0, seed=1)

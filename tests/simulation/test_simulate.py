@@ -24,11 +24,14 @@ LAWS = {
     "stiff series spring": dampers.SeriesSpring(dampers.Linear(15_000.0), 1.5e7),
     "motion ratio": dampers.MotionRatio(BESINGER, 1.3),
 }
+PLAIN = ("linear", "power", "lag")
 BUMP = roads.cosine_bump(0.06, start=0.1, duration=0.25)
 MS, MU, K, KT = 1200.0, 125.0, 60e3, 220e3
 
 
-@pytest.fixture(scope="module", params=LAWS)
+@pytest.fixture(
+    scope="module", params=[pytest.param(name, marks=[pytest.mark.slow] * (name not in PLAIN)) for name in LAWS]
+)
 def run(request):
     return simulate(quarter_car_000(LAWS[request.param]), BUMP, duration=1.0)
 
@@ -57,7 +60,9 @@ def test_energy_balance_closes(run):
 
 
 @pytest.mark.parametrize("tyre_damping", [0.0, 300.0])
-@pytest.mark.parametrize("name", ["besinger", "lag", "series spring"])
+@pytest.mark.parametrize(
+    "name", [*(pytest.param(n, marks=pytest.mark.slow) for n in ("besinger", "series spring")), "lag"]
+)
 def test_energy_error_falls_with_the_square_of_the_step(name, tyre_damping):
     car = replace(quarter_car_000(LAWS[name]), {"tyre_damping": tyre_damping})
     errors = []
@@ -76,7 +81,9 @@ def test_the_two_engines_agree(run):
         assert difference < share * np.abs(reference[channel]).max(), channel
 
 
-@pytest.mark.parametrize("name", ["linear", "power", "lag", "series spring"])
+@pytest.mark.parametrize(
+    "name", ["linear", "lag", *(pytest.param(n, marks=pytest.mark.slow) for n in ("power", "series spring"))]
+)
 def test_the_error_falls_with_the_step(name):
     car, finest = quarter_car_000(LAWS[name]), 1.25e-4
     strokes = {}
@@ -87,6 +94,7 @@ def test_the_error_falls_with_the_step(name):
     assert errors[0] > 3.0 * errors[1] > 9.0 * errors[2]
 
 
+@pytest.mark.slow
 def test_tyre_damping_is_the_same_in_both_engines_and_in_the_channels():
     car = replace(quarter_car_000(), {"tyre_damping": 2000.0})
     run, reference = (simulate(car, BUMP, duration=0.6, engine=engine) for engine in (Exponential(), Adaptive()))
@@ -166,6 +174,7 @@ def test_motion_is_unchanged_when_all_masses_and_forces_are_scaled():
     np.testing.assert_allclose(3 * one["damper_force"], three["damper_force"], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_batches_equal_loops_and_both_modes_of_differentiation_agree():
     car = quarter_car_000(LAWS["power"])
     heights = BUMP.height(jnp.arange(401.0) * 1e-3)

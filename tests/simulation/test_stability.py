@@ -31,7 +31,15 @@ def test_a_lag_needs_them_only_where_it_is_shorter_than_the_step():
     assert short == pytest.approx(2 * needed, abs=1)
 
 
-@pytest.mark.parametrize("law", [dampers.Linear(1.5e5), dampers.Lag(dampers.Linear(1e5), 1e-6), STEEP], ids=repr)
+@pytest.mark.parametrize(
+    "law",
+    [
+        pytest.param(dampers.Linear(1.5e5), marks=pytest.mark.slow),
+        pytest.param(dampers.Lag(dampers.Linear(1e5), 1e-6), marks=pytest.mark.slow),
+        STEEP,
+    ],
+    ids=repr,
+)
 def test_as_many_as_needed_follow_the_law(law):
     car = quarter_car_000(law)
     assert substeps_needed(car, 1e-3) > 1

@@ -125,7 +125,7 @@ def stated(caught):
 @pytest.mark.parametrize(
     ("law", "counts"),
     [
-        (dampers.MonoTube.reference(), [1, 1, 2, 4, 8]),
+        pytest.param(dampers.MonoTube.reference(), [1, 1, 2, 4, 8], marks=pytest.mark.slow),
         (dampers.ModifiedBoucWen.prototype(1.5), [1, 1, 2, 4, 8]),
         (dampers.Dahl(4e6, 40.0), [1, 1, 1, 2, 3]),
         (LUGRE, [1, 1, 1, 1, 1]),
@@ -144,7 +144,9 @@ def test_an_explicit_law_of_a_user_divides_a_step_that_it_cannot_follow():
     assert np.isfinite(Ride(quarter_car_000(OwnLag(1500.0, 0.0001)), BUMP, duration=0.5, metrics=RMS)()[RMS[0]])
 
 
-@pytest.mark.parametrize(("road", "dt"), [(ROUGH, 0.01), (BUMP, 0.02)], ids=["random", "bump"])
+@pytest.mark.parametrize(
+    ("road", "dt"), [pytest.param(ROUGH, 0.01, marks=pytest.mark.slow), (BUMP, 0.02)], ids=["random", "bump"]
+)
 def test_a_warning_states_the_error(road, dt):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

@@ -23,6 +23,7 @@ def test_the_best_choice_is_that_of_all_of_them() -> None:
     assert result.converged and not result.parameters[0].note
 
 
+@pytest.mark.slow
 def test_what_is_free_beside_a_choice_is_best_for_it() -> None:
     """Two catalogues and a bound, with a limit: against all combinations, of which one is the best."""
     car = vehicles.presets.quarter_car_000(dampers.Linear(1500.0) + dampers.Linear(1500.0))
@@ -108,6 +109,7 @@ def test_combinations_that_a_law_refuses_are_left_out_and_counted() -> None:
         tune.minimise(COMFORT, car, bump, over={"knots": tune.Choice([-0.5, 0.5])}, **run)
 
 
+@pytest.mark.slow
 def test_choices_without_effect_at_the_start_are_driven() -> None:
     """A stop that the stroke does not reach has no slope by its clearance, and yet another clearance has an effect."""
     stop = dampers.BumpStop(clearance=0.5, stiffness=2e5)

@@ -74,6 +74,7 @@ def on_roads():
     return laws, listed, tune.compare_dampers(laws, quarter_car, listed, metrics=[COMFORT, TYRE], duration=2.0, dt=2e-3)
 
 
+@pytest.mark.slow
 def test_roads_are_sampled_once_for_all_dampers(monkeypatch):
     phases = []
 

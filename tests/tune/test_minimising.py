@@ -73,6 +73,7 @@ def test_simulated_roads_find_the_optimum_within_their_sampling_error(preset):
     assert abs(np.mean(found) - best) < 3.0 * spread / np.sqrt(len(found))
 
 
+@pytest.mark.slow
 def test_gradient_through_the_simulation_agrees_with_differences():
     law = dampers.Bilinear(2600.0, 1400.0, knee_width=0.02)
     car = vehicles.presets.quarter_car_000(law)
@@ -207,6 +208,7 @@ def test_several_parameters_of_any_kind_can_be_free():
     assert float(parameters.get(result.vehicle, "damper.rate")) == pytest.approx(30e3 * np.sqrt(M / KT), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_knots_stay_in_order():
     law = dampers.PiecewiseLinear(jnp.array([-0.2, 0.05, 0.3]), jnp.array([900.0, 2500.0, 2600.0, 1500.0]))
     car = vehicles.presets.quarter_car_000(law)
@@ -254,6 +256,7 @@ def test_refuses_names_and_starts_that_do_not_fit(change, message):
         tune.minimise(**arguments)
 
 
+@pytest.mark.slow
 def test_on_a_white_road_the_rear_axle_follows_the_front():
     car, road = vehicles.presets.half_car_002(), roads.white("C", 15.0)
     result = tune.minimise("rms_pitch_acceleration", car, road, max_steps=1)

@@ -100,6 +100,7 @@ def test_a_limit_in_scenarios_is_judged_in_each_of_them_on_fresh_roads() -> None
     assert set(fresh.content()["metrics"]) == set(units)
 
 
+@pytest.mark.slow
 def test_the_numbers_of_the_worst_case_are_the_true_ones() -> None:
     """Of eight equal roads the smooth maximum of the search is 2 % above the largest value."""
     scenarios = tune.Scenarios([WHITE["C"]] * 8, risk="worst")

@@ -65,6 +65,7 @@ def test_derivatives_by_the_curve_agree_with_differences(found) -> None:
         assert curve.gradient[METRICS[0]][i] == pytest.approx(_central(run, 0.0, 2.0), rel=1e-5)
 
 
+@pytest.mark.slow
 def test_a_line_through_the_hats_is_a_damping_rate() -> None:
     """Hats whose forces are their velocities add a rate of one: their derivatives add up to that by the rate."""
     found = tune.sensitivity(METRICS[0], LINEAR, BUMP, over=["rate"], reach=2.0, hats=2, **RUN)
@@ -90,6 +91,7 @@ def test_second_derivatives_say_how_flat_an_optimum_is() -> None:
     assert "has a slope here, 0.28 % for 1 %" in aside.flatness(METRICS[0])[0]
 
 
+@pytest.mark.slow
 def test_the_value_in_the_worst_scenario_is_the_true_one() -> None:
     """A smooth maximum of two equal numbers, of which derivatives are, would be 0.7 % larger."""
     both = tune.Scenarios([WHITE, WHITE], risk="worst")
@@ -161,6 +163,7 @@ def test_unknown_scatter_is_refused_before_the_search(monkeypatch) -> None:
         tune.robust("comfort", LINEAR, tune.Scenarios([roads.white("C", 20.0)]), scatter={"rat": 0.1})
 
 
+@pytest.mark.slow
 def test_a_robust_tuning_meets_the_worst_case_better() -> None:
     """Two payloads want different rates; the tuning for the worst case has the smaller largest value."""
     loads = {"empty": tune.Condition(), "laden": tune.Condition({"sprung_mass": 1800.0})}
@@ -176,6 +179,7 @@ def test_a_robust_tuning_meets_the_worst_case_better() -> None:
     assert json.dumps(results[1].to_dict(), allow_nan=False) and results[1].tolerance_table().rows
 
 
+@pytest.mark.slow
 def test_the_gradient_passes_from_bench_samples_through_a_fit_to_a_metric() -> None:
     """Least squares of a bilinear law to forces, put into a car on a bump: against differences of the forces."""
     velocity = jnp.linspace(-0.5, 0.5, 21)

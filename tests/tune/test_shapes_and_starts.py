@@ -59,6 +59,7 @@ def test_numbers_of_curves() -> None:
     np.testing.assert_allclose(held_force(lagged, velocities), held_force(law, velocities), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_several_starts_find_the_same_optimum_as_one() -> None:
     car, road = vehicles.presets.quarter_car_000(dampers.Linear(600.0)), roads.white("C", 20.0)
     seen = []

@@ -37,6 +37,7 @@ def test_the_valving_of_a_known_damper_is_recovered_from_its_curve():
     assert result.rmse < 1e-3
 
 
+@pytest.mark.slow
 def test_both_valves_of_a_twin_tube_are_chosen():
     truth = dampers.TwinTube.reference()
     chosen = ["piston.rebound_opening_pressure", "base.leak"]

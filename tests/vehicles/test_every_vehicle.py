@@ -16,7 +16,7 @@ from .fleet import bumps, tracks, vehicles
 FLEET = vehicles()
 GRAVITY = 9.80665
 IN_OTHERS = ("quarter car", "half car", "roll car", "golden car")  # a part of others: not driven here
-LONG = ("full car", "walking beam", "independent tandem with cab")  # to compile
+LONG = ("full car", "walking beam", "independent tandem with cab", "half car with seat", "tracked hull")  # to compile
 DRIVEN = [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in FLEET if name not in IN_OTHERS]
 
 

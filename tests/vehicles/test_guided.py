@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from jaxdamp import Ride, roads, simulate
 from jaxdamp.dampers import CoulombFriction, Linear
@@ -17,6 +18,7 @@ def test_a_guide_with_a_dashpot_is_a_damper_to_the_ground():
     np.testing.assert_allclose(held - free, change, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_on_a_white_road_a_spring_to_the_ground_lets_what_follows_the_height_grow_without_end():
     road = roads.white("C", 20.0)
     held = Guided(CAR, (Guide(stiffness=500.0),))

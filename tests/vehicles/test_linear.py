@@ -59,6 +59,7 @@ def test_undamped_modes_solve_the_eigenproblem_and_overdamped_ones_do_not_oscill
     assert "without oscillation" in str(stiff)
 
 
+@pytest.mark.slow
 def test_walking_beam_pitches_on_its_tyres_alone():
     truck = replace(truck_001(), {"tandem.tyre_damping": 0.0})
     beam: Any = truck.tandem
@@ -73,7 +74,7 @@ def test_walking_beam_pitches_on_its_tyres_alone():
         stationary_rms(truck, speed=20.0)
 
 
-@pytest.mark.parametrize("speed", [None, 8.0, 25.0])
+@pytest.mark.parametrize("speed", [8.0, *(pytest.param(speed, marks=pytest.mark.slow) for speed in (None, 25.0))])
 def test_stationary_response_is_the_integral_of_the_frequency_response(speed):
     """White rate of height: S_z = 2 S/(2πf)². What lies outside the band is below a thousandth."""
     car = half_car_002()
@@ -88,6 +89,7 @@ def test_stationary_response_is_the_integral_of_the_frequency_response(speed):
         assert float(band[name]) == pytest.approx(float(exact[name]), rel=2e-3), name
 
 
+@pytest.mark.slow
 def test_two_tracks_apart_roll_the_car_and_one_track_does_not():
     frequency = np.geomspace(0.05, 40.0, 3000)
     density = 256e-6 * 0.1**2 * 20.0 / frequency**2  # class C at 20 m/s

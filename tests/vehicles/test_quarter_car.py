@@ -93,6 +93,7 @@ def test_lyapunov_solution_is_that_of_scipy(rng):
     ]
 
 
+@pytest.mark.slow
 def test_states_of_a_law_take_part():
     """A Maxwell element between the masses, its state space written by hand."""
     ms, mu, k, kt, c, ks = 400.0, 40.0, 2e4, 2e5, 1500.0, 4e5

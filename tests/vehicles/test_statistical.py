@@ -73,7 +73,9 @@ def test_friction_is_a_damper_of_slope_sqrt_2_over_pi_times_force_over_velocity(
 
 
 @pytest.mark.parametrize("road", [roads.white("A", 5.0), roads.white(1e-12, 1.0)])
-@pytest.mark.parametrize("law", [FRICTION, dampers.Linear(1500.0) + dampers.Dahl(5e5, 150.0)])
+@pytest.mark.parametrize(
+    "law", [FRICTION, pytest.param(dampers.Linear(1500.0) + dampers.Dahl(5e5, 150.0), marks=pytest.mark.slow)]
+)
 def test_friction_that_sticks_is_finite(law, road):
     rms = stationary_rms(quarter_car_000(law), road.velocity_psd)
     linear = stationary_rms(quarter_car_000(dampers.Linear(1500.0)), road.velocity_psd)
@@ -89,7 +91,9 @@ HYSTERESIS = {
 }
 
 
-@pytest.mark.parametrize("name", ["Dahl", "Bouc-Wen", pytest.param("LuGre", marks=pytest.mark.slow), "series spring"])
+@pytest.mark.parametrize(
+    "name", ["Dahl", "Bouc-Wen", *(pytest.param(name, marks=pytest.mark.slow) for name in ("LuGre", "series spring"))]
+)
 @pytest.mark.exhaustive_cases("Bouc-Wen")
 def test_laws_with_states_are_near_a_simulation(name):
     """The car with the equivalent linear damper on the same road says how far the road is from its expectation."""
@@ -106,7 +110,18 @@ def test_laws_with_states_are_near_a_simulation(name):
     assert acceleration(HYSTERESIS[name]) == pytest.approx(expected, rel=0.05)
 
 
-@pytest.mark.parametrize("name", ["friction", pytest.param("Dahl", marks=pytest.mark.slow)])
+def test_the_slope_is_that_of_differences():
+    def rms(force):
+        car = quarter_car_000(replace(FRICTION, {"terms.1.friction_force": force}))
+        return stationary_rms(car, ROAD.velocity_psd)["sprung_acceleration"]
+
+    derived = jax.jit(jax.value_and_grad(rms))
+    ahead, behind = (float(derived(force)[0]) for force in (150.5, 149.5))
+    assert float(derived(150.0)[1]) == pytest.approx(ahead - behind, rel=1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["friction", "Dahl"])
 def test_derivatives_are_those_of_difference_quotients_in_both_modes_first_and_second(name):
     law = {
         "friction": FRICTION,
@@ -128,6 +143,7 @@ def test_derivatives_are_those_of_difference_quotients_in_both_modes_first_and_s
     assert float(curved) == pytest.approx(second, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_sweep_and_vmap_give_the_numbers_of_single_cars():
     ride, forces = Ride(quarter_car_000(FRICTION), ROAD, metrics=[METRIC]), [20.0, 150.0, 400.0]
     path = "damper.terms.1.friction_force"
@@ -137,6 +153,7 @@ def test_a_sweep_and_vmap_give_the_numbers_of_single_cars():
     assert alone[0] > alone[1]
 
 
+@pytest.mark.slow
 def test_single_precision_is_finite_and_near_double():
     single = jax.tree.map(lambda a: a.astype(jnp.float32), quarter_car_000(HYSTERESIS["Dahl"]))
     with jax.enable_x64(False):
@@ -144,6 +161,7 @@ def test_single_precision_is_finite_and_near_double():
     assert found == pytest.approx(acceleration(HYSTERESIS["Dahl"]), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_two_dampers_of_a_half_car_have_their_own_slopes():
     car, road = half_car_002(dampers.Linear(1000.0) + dampers.CoulombFriction(80.0, 0.005)), roads.white("C", 15.0)
     found = equivalent_dampers(car, road.velocity_psd, speed=15.0)

@@ -26,6 +26,7 @@ def test_required_damping_and_its_damping_ratio(decrement, mean, ratio):
     assert modes(pinned).damping_ratio[1] == pytest.approx(ratio, abs=6e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("compression", "rebound", "decrement", "with_heave"),
     [(11.5e3, 23e3, 18.23, 17.14), (12.5e3, 20.5e3, 15.66, 15.09), (16e3, 16e3, 14.18, 14.05)],
