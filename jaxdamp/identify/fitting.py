@@ -256,7 +256,7 @@ def _solve_linear(problem: Problem) -> Solution:
     """Minimum of a linear least-squares problem within the domains."""
     free, coordinates = problem.free, problem.coordinates
     begin = np.asarray(free.values)
-    printed = evaluator(free, problem.residuals) if begin.dtype == np.float64 else None
+    printed = evaluator(free, problem.residuals)
     if printed is None:
         residual, jacobian = map(np.asarray, linearised(free, free.values, problem.residuals))
         whole = np.concatenate([jacobian, residual[:, None]], axis=1)

@@ -260,8 +260,7 @@ def _solved(
     lanes: Lanes, begin: Float[np.ndarray, "lanes free"], depends: Dependence | None, max_steps: int
 ) -> tuple[SearchLanes, np.ndarray, np.ndarray | None]:
     """The ends of all lanes, the best lane of each damper, and the vector of shared parameters."""
-    coordinates = lanes.searches[0].coordinates
-    bounds, precision = coordinates.bounds(), float(jnp.finfo(coordinates.free.values.dtype).eps)
+    bounds, precision = lanes.searches[0].coordinates.bounds(), lanes.searches[0].precision
     if depends is None:
         dampers = np.unique(lanes.damper)
         solver = BoundedLevenbergMarquardt(lower=bounds.lower, upper=bounds.upper, precision=precision)

@@ -2,8 +2,8 @@
 
 One function for each structure of a law serves records of any number and length, every start, and predictions. What it
 cannot compute is computed by XLA, with the same numbers: a machine with heat, a measured temperature, a command that
-varies, periodic or estimated initial states, single precision, or where no C compiler is at hand; the log says so once
-for each reason.
+varies, periodic or estimated initial states, or where no C compiler is at hand; the log says so once for each reason.
+C computes in double precision, whatever that of JAX is.
 """
 
 import dataclasses
@@ -51,8 +51,6 @@ def _refusal(parts: Sequence[Batch], model: PyTree) -> str:
             return "a command that varies"
         if part.cycle is not None:
             return "periodic initial states"
-        if any(leaf.dtype != np.float64 for leaf in (part.stroke, part.force)):
-            return "single precision"
     if starts_in(model):
         return "estimated initial states"
     return "a law that is traced" if is_traced((parts, model)) else ""
@@ -69,7 +67,7 @@ def predicted(batch: Batch, model: Model) -> Float[np.ndarray, "runs time"] | No
 def rows_of(batch: Batch) -> list[PrintedRecord]:
     """The records of a batch."""
     columns = (batch.dt, batch.stroke, batch.velocity, batch.weight, batch.force)
-    arrays = zip(*(np.ascontiguousarray(np.asarray(column)) for column in columns), strict=True)
+    arrays = zip(*(np.ascontiguousarray(np.asarray(column), np.float64) for column in columns), strict=True)
     return [PrintedRecord(float(dt), x, v, w, f, batch.substeps, batch.effects) for dt, x, v, w, f in arrays]
 
 

@@ -24,6 +24,7 @@ from jaxdamp.identify.model import count_states, fitted_part, of_law
 from jaxdamp.identify.noise import Noise
 from jaxdamp.identify.printed import evaluator
 from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.rows import on_device
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.traces import Batch
 from jaxdamp.parameters import get, with_values
@@ -216,14 +217,14 @@ def _printed_slopes(
     problem = evidence.problem
     free, columns = of_law(problem.free)
     values = np.asarray(evidence.minimum.values)
-    if problem.per_record or not columns.any() or problem.free.values.dtype != np.float64:
+    if problem.per_record or not columns.any():
         return None
     shape = velocity.size, steps + 1
     last = np.zeros(shape)
     last[:, -1] = 1.0
     still, moving = np.zeros(shape), np.repeat(velocity[:, None], shape[1], axis=1)
     signals = (np.full(velocity.size, STEP), still, moving, still, last, np.arange(velocity.size))
-    batch = Batch(*(jnp.asarray(a, a.dtype) for a in signals), fixed={}, per_record=(), substeps=1)
+    batch = Batch(*map(on_device, signals), fixed={}, per_record=(), substeps=1)
     printed = evaluator(free, [batch])
     if printed is None:
         return None

@@ -83,10 +83,14 @@ class Searches:
 
     def __init__(self, problem: Problem, solver: Solver | None = None) -> None:
         self.problem, self.coordinates, self._solver = problem, problem.coordinates, solver or SOLVER
-        self._kind = problem.free.values.dtype
-        by_c = self._kind == np.float64 and isinstance(self._solver, BoundedLevenbergMarquardt)
+        by_c = isinstance(self._solver, BoundedLevenbergMarquardt)
         self._printed = evaluator(problem.free, problem.residuals) if by_c else None
         self._to_values = self.coordinates.on_host() if self._printed else None
+
+    @property
+    def precision(self) -> float:
+        """The relative rounding error of the residuals."""
+        return float(np.finfo(np.float64 if self._printed else self.problem.free.values.dtype).eps)
 
     @property
     def is_printed(self) -> bool:
@@ -110,7 +114,7 @@ class Searches:
         start = np.asarray(self.coordinates.from_physical(values), np.float64)
         if held is not None:
             lower[held] = upper[held] = start[held]
-        limits = {"lower": lower, "upper": upper, "precision": float(jnp.finfo(self._kind).eps)}
+        limits = {"lower": lower, "upper": upper, "precision": self.precision}
         bounded = dataclasses.replace(self._solver, **limits)
         end = least_squares_on_host(self._at, bounded, start[None], max_steps)
         point: _Point = end.aux
@@ -130,7 +134,7 @@ class Searches:
     def here(self, y: Float[np.ndarray, " free"]) -> Here:
         """The problem at coordinates."""
         if self._printed is None or self._to_values is None:
-            return _by_xla(self.problem, self.coordinates, jnp.asarray(y, self._kind))
+            return _by_xla(self.problem, self.coordinates, jnp.asarray(y, self.problem.free.values.dtype))
         values, units = self._to_values(y)
         of_law, slopes = self._printed.margins(values)
         return Here(values, self._printed(values), units, of_law, slopes @ units)

@@ -136,13 +136,13 @@ def _gaps(law: AbstractDamper, velocity: np.ndarray, force: np.ndarray, settled:
 
 def _hold(law: AbstractDamper, velocities: Array, states: Array, count: Array) -> tuple[Array, Array]:
     """States and forces after so many more milliseconds at constant velocities."""
-    if velocities.dtype == np.float64 and states.size:
+    if states.size:
         numbers = numbers_on_rig(law)
         printed = printed_law(numbers, None)
         if printed is not None:
             s = np.array(states, np.float64)
             force = printed.hold(numbers.flat, np.ascontiguousarray(velocities, np.float64), int(count), s)
-            return on_device(s), on_device(force)
+            return on_device(s.astype(states.dtype)), on_device(force.astype(velocities.dtype))
     return _held_by_xla(law, velocities, states, count)
 
 

@@ -10,10 +10,11 @@ import pytest
 from jaxdamp import identify
 from jaxdamp.bench import SineTest, VirtualDyno
 from jaxdamp.codegen import _native
-from jaxdamp.dampers import Besinger, Lag, Linear, LuGre, Spring
+from jaxdamp.dampers import Besinger, Lag, Linear, LuGre, SeriesSpring, Spring
 from jaxdamp.identify import printed, search
 from jaxdamp.identify.traces import Batch
-from jaxdamp.rig import Rig, printed as printed_laws
+from jaxdamp.parameters import get
+from jaxdamp.rig import Rig, printed as printed_laws, quasi_static
 
 
 TRUTH = LuGre.guess(np.array([-0.3, 0.0, 0.3]), np.array([-600.0, 100.0, 900.0])) + Linear(1500.0) + Spring(2000.0)
@@ -159,6 +160,22 @@ def test_what_was_changed_on_disk_is_not_loaded(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(_native, "compiler", lambda: None)
     with pytest.raises(NotImplementedError, match="compiler"):
         _native.library.__wrapped__(text)
+
+
+def test_without_configure_a_fit_is_computed_by_c_too(monkeypatch) -> None:
+    """C computes in double precision, so that the numbers are those of a process that was configured."""
+    runs = VirtualDyno(SeriesSpring(Linear(2000.0), 3e5), sampling_rate=400.0, force_noise=10.0).run(TESTS[1:])
+    found = []
+    for double in (True, False):
+        with jax.enable_x64(double):
+            result = identify.fit(SeriesSpring(Linear(1500.0), 2e5), runs)
+            curve = quasi_static(result.law, [-0.3, 0.1, 0.4]).force
+            kind = np.float64 if double else np.float32
+            assert curve.dtype == get(result.law, "law.rate").dtype == kind
+        found.append([*curve, *(n for p in result.parameters for n in (p.value, p.standard_error)), result.rmse])
+        monkeypatch.setattr(search, "_by_xla", None)  # which is not called
+        monkeypatch.setattr("jaxdamp.rig.constant_velocity._held_by_xla", None)
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-4)
 
 
 @pytest.mark.slow
