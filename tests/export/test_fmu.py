@@ -189,6 +189,20 @@ def test_model_exchange(unit):
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("tolerance", [None, 1e-9])
+def test_a_solver_of_an_importer_is_right_at_its_default_tolerance_and_at_a_tight_one(files, name, tolerance):
+    """Tolerances are relative to the nominal values of the states: deflections of 0.1 mm, velocities of 0.3 m/s."""
+    time = instants(2e-4)
+    x, v = 0.02 * (1.0 - np.cos(20.0 * time)), 0.4 * np.sin(20.0 * time)  # from rest
+    signals = np.array([*zip(time, x, v, strict=True)], [(name, float) for name in ("time", "x", "v")])
+    options = {"output_interval": 2e-4, "input": signals, "output": ["F"], "fmi_type": "ModelExchange"}
+    done = fmpy.simulate_fmu(str(files(name)), stop_time=time[-1], relative_tolerance=tolerance, **options)
+    force = np.asarray(respond(LAWS[name], time, x, v))
+    off = np.interp(time, done["time"], done["F"]) - force
+    assert np.sqrt(np.mean(off**2)) < 0.01 * np.sqrt(np.mean(force**2))
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_directional_derivatives_are_the_slopes(unit, name):
     one = unit(name, fmpy.fmi2.FMU2Model)
     count = one.description.numberOfContinuousStates

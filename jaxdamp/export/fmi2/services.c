@@ -116,13 +116,6 @@ fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real indicators[], size_t
     return n ? fmi2Error : fmi2OK;
 }
 
-fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real nominal[], size_t n) {
-    size_t i;
-    UNUSED(c);
-    for (i = 0; i < n; ++i) nominal[i] = 1.0;
-    return fmi2OK;
-}
-
 /* ---- co-simulation */
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,

@@ -258,6 +258,32 @@ fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real rates[], size_t n) {
 
 #endif
 
+/* The largest values of the states in a cycle of the inputs by 40 mm within half a second: tolerances of solvers are
+ * relative to them, and deflections of oil or of a series spring are below a millimetre. */
+fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real nominal[], size_t n) {
+    Model *m = (Model *)c;
+    double carry[CARRY + 1], u0[INPUTS], u1[INPUTS];
+    size_t i;
+    int step, steps, k;
+    if (n != STATES) return fmi2Error;
+    refresh(m);
+    steps = (int)ceil(0.5 / m->step);
+    memcpy(carry, m->end, sizeof carry);
+    memcpy(u1, m->input, sizeof u1);
+    for (i = 0; i < n; ++i) nominal[i] = 0.0;
+    for (step = 1; step <= steps; ++step) {
+        const double rate = 4.0 * 3.14159265358979, phase = rate * step * m->step;
+        memcpy(u0, u1, sizeof u0);
+        for (k = 0; k < PAIRS; ++k) u1[k] = m->input[k] + 0.02 * (1.0 - cos(phase));
+        for (k = 0; k < RATES; ++k) u1[PAIRS + k] = 0.02 * rate * sin(phase);
+        advance(&m->p, m->matrices, u0, u1, m->step, 1, carry);
+        for (i = 0; i < n; ++i) nominal[i] = fmax(nominal[i], fabs(carry[i]));
+    }
+    for (i = 0; i < n; ++i)
+        if (!(nominal[i] > 0.0 && nominal[i] < HUGE_VAL)) nominal[i] = 1.0;
+    return fmi2OK;
+}
+
 /* ---- co-simulation */
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
