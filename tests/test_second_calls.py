@@ -9,7 +9,7 @@ from diffrax import Tsit5
 
 from jaxdamp import Ride, bench, identify, respond, roads, simulate, sweep, tune
 from jaxdamp.bench import BenchSet, SineTest
-from jaxdamp.dampers import Bilinear, BoucWen, Lag, Linear, Spring
+from jaxdamp.dampers import Bilinear, BoucWen, Lag, Linear, PiecewiseLinear, Spring
 from jaxdamp.rig import Rig
 from jaxdamp.simulation import Adaptive, Exponential
 from jaxdamp.vehicles import frequency_response, spectral_rms
@@ -101,6 +101,14 @@ OF_A_LENGTH = {
     "road of waves": (3, lambda count: roads.iso8608("C", 20.0, seed=1, length=100.0 * count).phase),
     "filtered road": (4, lambda count: roads.iso8608_filtered("C", 20.0, seed=1, length=1.0 * count).samples),
 }
+
+
+def test_numbers_of_a_law_are_converted_by_no_program():
+    laws = [
+        lambda r: PiecewiseLinear([-0.1, 0.2], [r, 3, 9e2]),
+        lambda r: PiecewiseLinear((0.1, 0.2, 0.3), (r, 4, 5, 6)),
+    ]
+    assert [in_calls(law, [1500.0]) for law in laws] == [[0], [0]]
 
 
 @pytest.mark.parametrize("name", OF_A_LENGTH)

@@ -178,6 +178,7 @@ class ViscoPlastic(AbstractViscoPlastic):
     def plainer(self, undetermined: Sequence[str], fastest: float) -> AbstractDamper:
         """One element in place of all, which gives from the start, beside a viscous force."""
         del undetermined
-        elastic = Dahl((self.sliding_forces / self.elastic_travels).sum(), self.sliding_forces.sum())
-        rate = self.viscous_force * fastest ** (self.exponent - 1.0)
+        forces, travels = np.asarray(self.sliding_forces), np.asarray(self.elastic_travels)
+        elastic = Dahl((forces / travels).sum(), forces.sum())
+        rate = float(self.viscous_force) * fastest ** (float(self.exponent) - 1.0)
         return sliding(rate, self.yield_force, self.flow_velocity, elastic, fastest)

@@ -112,7 +112,7 @@ def _size(law: AbstractDamper) -> int:
 
 def held_of(law: AbstractDamper, fastest: float) -> tuple[str, ...]:
     """Paths of numbers that are not fitted: at zero where they may be, or without effect up to a velocity [m/s]."""
-    zero = [p.path for p in parameters(law) if p.domain is nonnegative and not np.any(p.value)]
+    zero = [p.path for p in parameters(law) if p.domain is nonnegative and not np.asarray(p.value).any()]
     return *zero, *(place + name for place, part in laws_inside(law) for name in part.without_effect(fastest))
 
 

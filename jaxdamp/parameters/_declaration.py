@@ -32,20 +32,21 @@ def as_float(value: object, name: str = "value") -> Array:
         return value
     if value is None or isinstance(value, str | bytes | type | eqx.Module):
         _checks.refuse(name, "be a number", _checks.described(value))
-    if jnp.iscomplexobj(value):
-        _checks.refuse(name, "be a real number", _checks.described(value))
+    plain = all(isinstance(each, int | float) for each in (value if isinstance(value, list | tuple) else (value,)))
     try:
-        if isinstance(value, int | float | np.ndarray):
+        if not plain and jnp.iscomplexobj(value):
+            _checks.refuse(name, "be a real number", _checks.described(value))
+        if plain or isinstance(value, np.ndarray):
             value = np.asarray(value)  # arrays of NumPy are copied; numbers would be converted by a compiled program
         made = jnp.asarray(value, dtype=float)
         if isinstance(made, Tracer) and not is_traced(value):
             with jax.ensure_compile_time_eval():  # a plain number is known inside `jax.jit`, too
                 made = jnp.asarray(value, dtype=float)
         return made
-    except (TypeError, ValueError) as error:
-        if isinstance(value, list | tuple | dict | set | np.ndarray):
-            raise ValueError(f"Argument `{name}` must be numbers, but is {value!r}: {error}") from error
+    except (_checks.ArgumentError, jax.errors.JAXTypeError):
         raise
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"Argument `{name}` must be numbers, but is {value!r}: {error}") from error
 
 
 Declared: TypeAlias = Mapping[str, Any]  # of a field: unit, meaning, domain and the others

@@ -55,6 +55,11 @@ def test_a_number_out_of_its_domain_is_refused_in_whatever_it_comes(ride):
     [
         (lambda: dampers.Linear(1.0 + 2.0j), "`rate` must be a real number"),
         (lambda: dampers.Linear(jnp.asarray(1.0 + 2.0j)), "`rate` must be a real number"),
+        (lambda: dampers.PiecewiseLinear([0.1], [1.0, 2.0j]), "`slopes` must be a real number"),  # pyright: ignore
+        (lambda: dampers.PiecewiseLinear([0.1], ["stiff", 2.0]), r"`slopes` must be numbers, but is \['stiff', 2.0\]"),  # pyright: ignore
+        (lambda: dampers.PiecewiseLinear([0.1], [[1.0, 2.0], [3.0]]), r"`slopes` must be numbers, but is \[\[1.0"),  # pyright: ignore
+        (lambda: dampers.Linear(10**400), "`rate` must be numbers, but is"),
+        (lambda: dampers.Linear(object()), "`rate` must be numbers, but is"),  # pyright: ignore
         (lambda: simulate(quarter_car_000(eqx.filter_vmap(dampers.Linear)(jnp.ones(2))), BUMP), "must be one number"),
         (lambda: Ride(quarter_car_000(eqx.filter_vmap(dampers.Linear)(jnp.ones(2))), BUMP), "must be one number"),
         (lambda: jax.jit(lambda dt: _checks.plain_number("dt", dt))(1e-3), "`dt` must be a plain number"),
