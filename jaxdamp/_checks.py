@@ -185,8 +185,10 @@ def instance(argument: str, value: object, kinds: type | tuple[type, ...], must:
 
 
 def counts(**values: int | None) -> None:
-    """Refuse counts below one; None stands for one that was left out."""
+    """Refuse counts that are not whole or below one; None stands for one that was left out."""
     for argument, value in values.items():
+        if value is not None and not hasattr(value, "__index__"):
+            refuse(argument, "be a whole number", described(value))
         if value is not None and value < 1:
             refuse(argument, "be 1 or more", value)
 

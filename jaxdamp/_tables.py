@@ -198,7 +198,7 @@ class Table:
         head = "".join(
             f'<th scope="col"{side}>{html.escape(said(heading) if words else heading)}</th>' for heading, side in cells
         )
-        named = [words and column.name in _NAMES for column in self.columns]
+        named = [words and c.name in _NAMES and not self.is_number(i) for i, c in enumerate(self.columns)]
         lines = []
         for row in self.texts():
             parts = [_html_cell(*part, words=words) for part in zip(row, sides, named, strict=True)]

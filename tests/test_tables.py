@@ -34,6 +34,14 @@ def test_text_stands_in_columns() -> None:
     assert str(table) == repr(table) == "T\nname       force [N]  note\nlong name        3.1"
 
 
+def test_numbers_below_a_heading_of_names_keep_their_points_on_a_page():
+    """A ride has a column "law" of numbers beside those of the baseline."""
+    table = Table("Ride", (Column("metric"), Column("law")), (("rms_sprung_acceleration", 1.137), ("peak", 2.678)))
+    assert '<td class="number">1.137</td>' in table.to_html(words=True)
+    names = Table("Laws", (Column("law"), Column("rmse")), (("series_spring.rate", 1.137),))
+    assert 'title="series_spring.rate"' in names.to_html(words=True)
+
+
 def test_comparisons_have_a_change_only_of_several() -> None:
     rows = [Compared("travel", "m", (2.0, 3.0), percent_change(2.0, 3.0)), Compared("jerk", "m/s^2", (0.0, 1.0), None)]
     table = comparison_table("T", "metric", ("before", "after"), rows)

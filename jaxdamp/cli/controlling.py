@@ -82,10 +82,12 @@ def parse_policy(word: str, car: AbstractVehicle) -> Policy:
     name, _, rest = word.partition(":")
     _checks.one_of("controller", name, known)
     try:
-        pairs = (part.split("=") for part in rest.split(",") if part)
+        pairs = [part.split("=") for part in rest.split(",") if part]
         numbers = {key.strip(): float(value) for key, value in pairs}
     except ValueError:
         _checks.refuse("controller", "read like skyhook:gain=3000,lead=0.01", repr(word))
+    if len(numbers) < len(pairs):
+        _checks.refuse("controller", "give each number once", repr(word))
     fields = inspect.signature(known[name]).parameters
     for key in numbers:
         _checks.one_of("controller", key, fields)

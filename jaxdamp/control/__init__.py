@@ -9,7 +9,7 @@ your own (`AbstractVehiclePolicy`). `lqr` finds the gains of a linear feedback. 
 from jaxdamp.control.actuator import RateLimit
 from jaxdamp.control.controlled import Controlled
 from jaxdamp.control.filtered import BandSkyhook
-from jaxdamp.control.levels import laws_at_levels as laws_at_levels
+from jaxdamp.control.levels import laws_at_levels as laws_at_levels, outer_forces as outer_forces
 from jaxdamp.control.loop import (
     Commands as Commands,
     ControlLoop as ControlLoop,

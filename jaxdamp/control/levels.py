@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar
@@ -55,3 +56,14 @@ def forces_at(laws: Sequence[AbstractDamper], velocity: Scalar) -> Float[Array, 
 
         state, _ = jax.lax.scan(held, state, None, length=STEPS)
     return jnp.stack([law.force(zero, velocity, state) for law in laws])
+
+
+def forces_both_ways(laws: Sequence[AbstractDamper], velocity: Scalar) -> Float[Array, "2 laws"]:
+    """`forces_at` a velocity in extension and in compression."""
+    return jnp.stack([forces_at(laws, velocity), forces_at(laws, -velocity)])
+
+
+def outer_forces(law: AbstractDamper, velocity: Scalar) -> list[float]:
+    """The sizes of the forces of an element [N] at its lowest and its highest level, at ± a velocity together."""
+    laws = laws_at_levels(law)
+    return np.abs(forces_both_ways([laws[0], laws[-1]], velocity)).sum(axis=0).tolist()

@@ -5,6 +5,7 @@ The command whose force comes nearest waits for the delay and becomes the target
 lag, exactly over each step.
 """
 
+import functools
 import itertools
 import math
 from collections.abc import Callable, Sequence
@@ -21,7 +22,7 @@ from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp._vectors import Matrix, MemoryLayout, SmallVector, laid_out, scalars, times
 from jaxdamp.codegen import is_printing
 from jaxdamp.control.actuator import RateLimit, decay
-from jaxdamp.control.levels import forces_at, interpolated, laws_at_levels, scheduled_in
+from jaxdamp.control.levels import forces_both_ways, interpolated, laws_at_levels, scheduled_in
 from jaxdamp.control.policies import Signals
 from jaxdamp.control.sensors import Noise, Reader, Sensors, noise_of, readers
 from jaxdamp.control.together import AbstractVehiclePolicy, EachDamper
@@ -220,9 +221,7 @@ class Sampler(eqx.Module):
         self._readers = readers(sensors, loop.sensor_lag, dt, loop.period)
         self._levels = [scalars(levels) for levels in loop.levels(laws)]
         self._laws = [laws_at_levels(laws[port]) for port in loop.ports]
-        self._small = [
-            [jnp.diff(forces_at(pair, loop.still))[0] for pair in itertools.pairwise(laws)] for laws in self._laws
-        ]
+        self._small = [[_rise(pair, loop.still) for pair in itertools.pairwise(laws)] for laws in self._laws]
 
     def begin(self, signals: tuple[Signals, ...]) -> ControlState:
         """Before the first sample, which the first instant takes."""
@@ -308,15 +307,30 @@ class Sampler(eqx.Module):
 
         Between two levels the force is taken as straight in the command. Each share is rounded where the levels' forces
         differ little, as much as they differ at the velocity `still`, and at both ends: it has derivatives everywhere,
-        and never leaves the levels.
+        and never leaves the levels. Where the forces of three levels or more are not in their order, it is that of the
+        two levels between which the force comes nearest.
         """
         forces = [law.force(seen.stroke, seen.velocity, state) for law in self._laws[damper]]
         levels, command = self._levels[damper], self._levels[damper][0]
-        for i, small in enumerate(self._small[damper]):
-            rise = forces[i + 1] - forces[i]
-            share = (demand - forces[i]) * rise / (rise * rise + small * small + LEAST)
-            command = command + (levels[i + 1] - levels[i]) * _rounded_limits(share)
-        return command
+        rises, nearest = [after - before for before, after in itertools.pairwise(forces)], []
+        for i, (rise, small) in enumerate(zip(rises, self._small[damper], strict=True)):
+            share = _rounded_limits((demand - forces[i]) * rise / (rise * rise + small * small + LEAST))
+            part = (levels[i + 1] - levels[i]) * share
+            command = command + part
+            nearest.append((abs(forces[i] + rise * share - demand), levels[i] + part))
+        if len(rises) == 1:
+            return command
+        in_order = (functools.reduce(jnp.minimum, rises) >= 0.0) | (functools.reduce(jnp.maximum, rises) <= 0.0)
+        (miss, best), *others = nearest
+        for other, candidate in others:
+            best, miss = jnp.where(other < miss, candidate, best), jnp.minimum(other, miss)
+        return jnp.where(in_order, command, best)
+
+
+def _rise(pair: Sequence[AbstractDamper], velocity: Scalar) -> Scalar:
+    """By how much the forces of two laws differ at a velocity in extension, or, where they do not, in compression."""
+    rises = jnp.diff(forces_both_ways(pair, velocity))[:, 0]
+    return jnp.where(rises[0] == 0.0, rises[1], rises[0])
 
 
 LEAST = 1e-12  # N², where two levels have the same force

@@ -1,5 +1,7 @@
 """The linear quadratic regulator of a car, as a policy."""
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 
@@ -8,7 +10,7 @@ from jaxdamp.control.controlled import rows_of
 from jaxdamp.control.levels import takes_command
 from jaxdamp.control.policies import StateFeedback
 from jaxdamp.control.together import VehicleFeedback
-from jaxdamp.vehicles import AbstractVehicle
+from jaxdamp.vehicles import AbstractVehicle, static_equilibrium, tangent_stiffness
 
 
 def lqr(car: AbstractVehicle, *, stroke: float = 2e3, tyre: float = 1e4) -> StateFeedback | VehicleFeedback:
@@ -17,8 +19,9 @@ def lqr(car: AbstractVehicle, *, stroke: float = 2e3, tyre: float = 1e4) -> Stat
         F = −K s,   s = (ż_b, ż_w, x, d) of every damper,   min E[Σ z̈_b² + q_x x² + q_d d²]
 
     with the stroke x and the deflection d of the tyre, by the algebraic Riccati equation of the car with its masses,
-    springs and tyres and no force in its dampers. In a `Controlled` vehicle the damper gives what it can of it: a
-    clipped LQR. All of the state is needed; a tyre deflection is seldom measured, so it shows what feedback can reach.
+    springs and tyres and no force in its dampers; laws that take no command count with their stiffness at rest. In a
+    `Controlled` vehicle the damper gives what it can of it: a clipped LQR. All of the state is needed; a tyre
+    deflection is seldom measured, so it shows what feedback can reach.
 
     It is computed by SciPy, outside of JAX: not differentiable. The gains are parameters, which a tuning moves.
 
@@ -65,6 +68,7 @@ def state_space(car: AbstractVehicle) -> tuple[np.ndarray, np.ndarray, np.ndarra
     Arguments:
         car: as in `lqr`.
     """
+    _checks.instance("car", car, AbstractVehicle, "be a vehicle", "Put the damper into one.")
     system, frame = car.system(), car.frame()
     taking = [i for i, law in enumerate(system.laws) if takes_command(law)]
     form, n = system.form, len(taking)
@@ -75,7 +79,11 @@ def state_space(car: AbstractVehicle) -> tuple[np.ndarray, np.ndarray, np.ndarra
         _checks.refuse(
             "car", must, f"a {type(car).__name__}", "Take `control.ModalSkyhook` or `control.StateFeedback`."
         )
-    mass, stiffness, damping, ports = (np.asarray(getattr(form, k)) for k in ("mass", "stiffness", "damping", "ports"))
+    mass, damping, ports = (np.asarray(getattr(form, k)) for k in ("mass", "damping", "ports"))
+    others = [i for i in range(len(system.laws)) if i not in taking]
+    springs = dataclasses.replace(form, ports=form.ports[np.array(others, dtype=int)])
+    rest = jnp.stack([*static_equilibrium(car.passive).values()])
+    stiffness = np.asarray(tangent_stiffness(springs, [system.laws[i] for i in others], rest))
     inertia = moves @ np.linalg.inv(mass)
     of_rates, of_stretch = -inertia @ damping @ np.linalg.inv(moves), -inertia @ stiffness @ np.linalg.inv(stretches)
     of_force = -inertia @ ports[taking].T

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from jaxdamp import _checks
 from jaxdamp._random import normal_at
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.control.actuator import decay
@@ -163,6 +164,11 @@ class Sensors(AbstractDeclared):
     stroke: SignalSensor | None = None
     velocity: SignalSensor | Differentiated | None = None
     seed: Number = parameter("", "whole number that the noise follows from", nonnegative, default=0.0, adjustable=False)
+
+    def __check_init__(self) -> None:
+        seed = _checks.concrete(self.seed)
+        if seed is not None and np.any(seed != np.round(seed)):
+            _checks.refuse("seed", "be a whole number", f"{seed}")
 
     def without_noise(self) -> "Sensors":
         """The same without a random part."""

@@ -221,9 +221,14 @@ def check_control(engine: AbstractEngine, system: System, dt: float, duration: f
             must = f"be a whole number of steps of {dt:g} s"
             near = max(round(steps), 1) * dt
             _checks.refuse(name, must, f"{value:g} s", f"Pass `{name}={near:g}`, or another `dt`.")
-    if not part and control.delay >= duration:
-        remedy = "No command of the controller would be applied."
-        _checks.refuse("delay", f"be shorter than the run of {duration:g} s", f"{control.delay:g} s", remedy)
+    whys = {
+        "period": "The controller would take its first sample alone, at rest.",
+        "delay": "No command of the controller would be applied.",
+    }
+    for name, why in whys.items():
+        value = getattr(control, name)
+        if not part and value >= duration:
+            _checks.refuse(name, f"be shorter than the run of {duration:g} s", f"{value:g} s", why)
 
 
 def check_demands(

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._types import Signal
-from jaxdamp.control import ControlLoop
+from jaxdamp.control import ControlLoop, outer_forces
 from jaxdamp.dampers import AbstractDamper, Motion, RangeUse, has_fitted_range, range_use, sentence
 from jaxdamp.vehicles import AbstractVehicle, ChannelKind, PortForm, System
 
@@ -173,7 +173,8 @@ def commands_at_limits(
         near = NEAR * (high - low)
         for word, level, at_end in (("lowest", low, command < low + near), ("highest", high, command > high - near)):
             if (share := float(np.mean(at_end))) > ALWAYS:
-                at_most = "no softer" if word == "lowest" else "no harder"
+                here, there = outer_forces(system.laws[port], control.still)[:: 1 if word == "lowest" else -1]
+                at_most = "no softer" if here < there else "no harder"
                 texts.append(
                     f"The command of the {name} stood at its {word} level, {level:g}, {100.0 * share:.0f} % of the "
                     f"time: the damper can be {at_most} than it is there."

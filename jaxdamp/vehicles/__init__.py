@@ -27,7 +27,11 @@ from jaxdamp.vehicles.equilibrium import (
     rest_position as rest_position,
     static_equilibrium,
 )
-from jaxdamp.vehicles.frame import Frame, LiftOffWithLaws as LiftOffWithLaws
+from jaxdamp.vehicles.frame import (
+    Frame,
+    LiftOffWithLaws as LiftOffWithLaws,
+    tangent_stiffness as tangent_stiffness,
+)
 from jaxdamp.vehicles.frequency_response import frequency_response, spectral_rms
 from jaxdamp.vehicles.guided import ForceDriven as ForceDriven, Guide, Guided
 from jaxdamp.vehicles.linear import (

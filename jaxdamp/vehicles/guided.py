@@ -5,6 +5,7 @@ from typing import final
 
 import equinox as eqx
 
+from jaxdamp import _checks
 from jaxdamp._types import Number, ScalarLike
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import nonnegative, parameter
@@ -25,7 +26,7 @@ class ForceDriven(AbstractVehicle):
     motion. Forces are those on the wheels minus the static loads, positive up. Tyres have no part in the motion.
 
     Arguments:
-        car: any vehicle.
+        car: any vehicle without a controller, which goes around this one.
 
     >>> from jaxdamp.vehicles import presets
     >>> ForceDriven(presets.quarter_car_000()).port_form().road_stiffness.tolist()
@@ -33,6 +34,9 @@ class ForceDriven(AbstractVehicle):
     """
 
     car: AbstractVehicle
+
+    def __check_init__(self) -> None:
+        _refuse_controlled(self.car, type(self).__name__)
 
     def frame(self) -> Frame:
         """The parts of the vehicle, on soft springs."""
@@ -74,7 +78,7 @@ class Guided(AbstractVehicle):
     """A vehicle whose bodies run in guides, or are held to the ground: a quarter-car rig.
 
     Arguments:
-        car: any vehicle.
+        car: any vehicle without a controller, which goes around this one.
         guides: of its bodies, one for each.
 
     >>> from jaxdamp.dampers import CoulombFriction
@@ -87,7 +91,18 @@ class Guided(AbstractVehicle):
     car: AbstractVehicle
     guides: tuple[Guide, ...]
 
+    def __check_init__(self) -> None:
+        _refuse_controlled(self.car, type(self).__name__)
+
     def frame(self) -> Frame:
         """The parts of the vehicle and the guides."""
         frame = self.car.frame()
         return dataclasses.replace(frame, links=(*frame.links, *[guide.link(frame) for guide in self.guides]))
+
+
+def _refuse_controlled(car: AbstractVehicle, around: str) -> None:
+    """Refuse a vehicle whose controller would not be seen from outside."""
+    _checks.instance("car", car, AbstractVehicle, "be a vehicle", "Such as `vehicles.presets.quarter_car_000()`.")
+    if car.passive is not car:
+        remedy = f"Put the controller around: `Controlled({around}(vehicle, ...), policy)`."
+        _checks.refuse("car", "be without a controller", f"a {type(car).__name__}", remedy)

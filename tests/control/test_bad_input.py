@@ -5,11 +5,13 @@ import numpy as np
 import pytest
 
 from jaxdamp import Ride, roads, simulate
-from jaxdamp.control import AbstractPolicy, Controlled, RateLimit, Skyhook, StateFeedback
-from jaxdamp.dampers import Linear, Scheduled
-from jaxdamp.vehicles import Corner, HalfCar, QuarterCar
+from jaxdamp.control import AbstractPolicy, Controlled, RateLimit, Sensors, SignalSensor, Skyhook, StateFeedback, lqr
+from jaxdamp.dampers import Bilinear, Linear, PiecewiseLinear, Scheduled
+from jaxdamp.parameters import replace
+from jaxdamp.vehicles import Corner, ForceDriven, Guided, HalfCar, QuarterCar
 
 
+VALVE = PiecewiseLinear([-0.3, 0.3], [2000.0, 2000.0, 2000.0])
 DAMPER = Scheduled((Linear(300.0), Linear(3900.0)), levels=[0.0, 1.0], command=0.25)
 HALF = HalfCar(700.0, 1200.0, 1.2, 1.5, Corner(40.0, 18e3, 200e3, DAMPER), Corner(45.0, 22e3, 200e3, DAMPER))
 QUARTER = QuarterCar(400.0, 50.0, 20e3, 250e3, DAMPER)
@@ -49,6 +51,14 @@ def test_commands_that_stay_at_a_limit_are_said():
     assert len(hard.notes) == 1 and hard.notes[0].startswith(
         "The command of the damper stood at its highest level, 2, 9"
     )
+    assert hard.notes[0].endswith("the damper can be no harder than it is there.")
+    closed = Scheduled((Linear(400.0), Linear(300.0)), levels=[0.0, 2.0], command=0.5)  # clicks from closed
+    for policy, words in (
+        (StateFeedback(velocity=1e6), "lowest level, 0"),
+        (StateFeedback(velocity=-1e6), "highest level, 2"),
+    ):
+        (note,) = simulate(Controlled(quarter(closed), policy), ROAD, duration=1.0).notes
+        assert words in note and note.endswith(f"no {'harder' if 'lowest' in note else 'softer'} than it is there.")
     slow = simulate(Controlled(QUARTER, Skyhook(), rate_limit=RateLimit(3.0, 3.0)), ROAD, duration=1.0)
     assert len(slow.notes) == 1 and "changed as fast as its actuator can, 3 up and 3 down per second" in slow.notes[0]
     assert not simulate(Controlled(QUARTER, Skyhook(), rate_limit=RateLimit(100.0, 100.0)), ROAD, duration=1.0).notes
@@ -78,9 +88,31 @@ def test_commands_that_stay_at_a_limit_are_said():
             lambda: simulate(Controlled(QUARTER, Skyhook(), period=7.5e-4), ROAD, duration=1.0),
             "`period` must be a whole",
         ),
+        (
+            lambda: simulate(Controlled(QUARTER, Skyhook(), period=0.5), ROAD, duration=0.5),
+            "`period` must be shorter than the run of 0.5 s, but is 0.5 s",
+        ),
+        (lambda: Controlled(DAMPER, Skyhook()), "`car` must be a vehicle, but is a Scheduled"),  # type: ignore[arg-type]
+        (lambda: lqr(DAMPER), "`car` must be a vehicle, but is a Scheduled"),  # type: ignore[arg-type]
+        (
+            lambda: Controlled(QUARTER, Skyhook(), sensors=SignalSensor()),  # type: ignore[arg-type]
+            "`sensors` must be `Sensors`, or a dict of them by damper, but is a SignalSensor",
+        ),
+        (
+            lambda: Controlled(QUARTER, Skyhook(), sensors={"damper": 5}),  # type: ignore[arg-type]
+            "`sensors` must be .* but is the number 5",
+        ),
+        (lambda: Sensors(seed=1.5), "`seed` must be a whole number, but is 1.5"),
+        (
+            lambda: Guided(Controlled(QUARTER, Skyhook()), ()),
+            r"`car` must be without a controller, .* `Controlled\(Guided\(vehicle, ...\), policy\)`",
+        ),
+        (lambda: ForceDriven(Controlled(QUARTER, Skyhook())), r"`Controlled\(ForceDriven\(vehicle"),
+        (lambda: Guided(DAMPER, ()), "`car` must be a vehicle"),  # type: ignore[arg-type]
     ],
     ids="""delay,delay of a ride,levels are no parameter,command,a word,no policy,no policies,endless delay,still,\
-no command,two controllers,period""".split(","),
+no command,two controllers,period,one sample,a damper,regulator of a damper,a signal,a number,seed,guided,force driven,\
+guided damper""".split(","),
 )
 def test_what_cannot_be_controlled_is_refused(make, message):
     with pytest.raises(ValueError, match=message):
@@ -101,3 +133,27 @@ def _delayed(delay):
 
 def _command(command):
     return Controlled(quarter(Scheduled(DAMPER.laws, levels=[0.0, 1.0], command=command)), Skyhook())
+
+
+@pytest.mark.parametrize("blend", ["parameters", "force"])
+def test_a_damper_adjusted_in_one_direction_or_fast_alone_is_commanded(blend):
+    """Levels of the same force at 0.1 m/s in extension differ elsewhere."""
+    damper = Scheduled((Bilinear(1500.0, 300.0), Bilinear(1500.0, 2000.0)), [0.0, 1.0], command=0.0, blend=blend)
+    command = simulate(Controlled(quarter(damper), Skyhook(3e4)), ROAD, duration=1.0)["damper_command"]
+    assert np.min(command) < 0.1 and np.max(command) > 0.9
+    fast = Scheduled((VALVE, replace(VALVE, {"slopes": [2e3, 2e3, 900.0]})), [0.0, 1.0], command=0.0, blend=blend)
+    run = simulate(Controlled(quarter(fast), StateFeedback()), ROAD, duration=0.5, start={"z_sprung": -0.1})
+    rebound = np.asarray(run["damper_velocity"])[:-1] > 0.5  # where the second level is softer
+    assert rebound.any() and np.median(np.asarray(run["damper_command"])[1:][rebound]) > 0.9
+
+
+@pytest.mark.parametrize("top", [2100.0, 1999.0])
+def test_the_softest_level_is_commanded_where_forces_of_levels_are_not_in_order(top):
+    """Of a coil that saturates the last level may be a little softer than the one before."""
+    levels = Scheduled((Linear(300.0), Linear(2000.0), Linear(top)), levels=[0.0, 1.0, 2.0], command=0.0)
+    soft = simulate(Controlled(quarter(levels), StateFeedback()), ROAD, duration=1.0)  # which demands no force
+    assert np.max(soft["damper_command"]) < 0.1
+    hard = simulate(Controlled(quarter(levels), StateFeedback(velocity=1e6)), ROAD, duration=1.0)
+    moving = np.abs(np.asarray(hard["damper_velocity"])) > 0.1
+    held = np.asarray(hard["damper_force"])[moving] / np.asarray(hard["damper_velocity"])[moving]
+    assert np.median(held) > 1900.0

@@ -1,5 +1,6 @@
 """Each policy against its formula written again, and those of all dampers together in runs."""
 
+import dataclasses
 from typing import Any
 
 import equinox as eqx
@@ -22,8 +23,9 @@ from jaxdamp.control import (
     VehicleFeedback,
     lqr,
 )
-from jaxdamp.dampers import Linear, Scheduled
+from jaxdamp.dampers import Linear, Scheduled, Spring
 from jaxdamp.export import from_json, to_json
+from jaxdamp.parameters import replace
 from jaxdamp.vehicles import Axle, Corner, HalfCar, QuarterCar, RollCar, Seat, SeatMass
 
 
@@ -158,6 +160,12 @@ def test_a_half_car_of_two_quarters_has_the_gains_of_each():
             gains = np.asarray(getattr(policy, name))
             assert gains[i, i] == pytest.approx(float(getattr(own, name)), rel=1e-6)
             assert abs(gains[i, 1 - i]) < 1e-6 * np.abs(np.diag(gains)).max()
+
+
+def test_springs_as_laws_count_in_the_optimal_feedback():
+    half = {"spring_rate": 0.5 * QUARTER.spring_rate}
+    other = dataclasses.replace(replace(QUARTER, half), extra_spring=Spring(half["spring_rate"]))
+    np.testing.assert_allclose(jax.tree.leaves(lqr(other)), jax.tree.leaves(lqr(QUARTER)), rtol=1e-9)
 
 
 def test_feedback_of_the_vehicle_multiplies_gains_and_signals():

@@ -169,7 +169,7 @@ def test_without_configure_a_fit_is_computed_by_c_too(monkeypatch) -> None:
     for double in (True, False):
         with jax.enable_x64(double):
             result = identify.fit(SeriesSpring(Linear(1500.0), 2e5), runs)
-            curve = quasi_static(result.law, [-0.3, 0.1, 0.4]).force
+            curve = quasi_static(result.law, np.array([-0.3, 0.1, 0.4])).force
             kind = np.float64 if double else np.float32
             assert curve.dtype == get(result.law, "law.rate").dtype == kind
         found.append([*curve, *(n for p in result.parameters for n in (p.value, p.standard_error)), result.rmse])
