@@ -47,8 +47,8 @@ def report(
     """The whole chain on one page: bench records, fitted laws, rides on the best one, and its tuning.
 
     Writes the laws, the tuned vehicle, tables, pictures and the page. The vehicle rides with its own dampers, with the
-    fitted law at all of them, and with the tuned laws. Nothing is tuned if the law has no parameter that a workshop can
-    change and that the records determine. Ends with exit code 1 if a limit is not met.
+    fitted law (of truck_001 in front), and with the tuned laws. Nothing is tuned if the law has no parameter that a
+    workshop can change and that the records determine. Ends with exit code 1 if a limit is not met.
 
     Arguments:
         law: names of laws to fit, see "jaxdamp laws": "linear,besinger"; or "all"; six that suit the records if left
@@ -123,8 +123,6 @@ def _driven(
 
 TRUE = "true damper"
 EVENT = 2.0  # s: length of a ride over a bump
-ISO = "ISO 8608 class C at 20 m/s"
-BUMP = "a bump, 60 mm high and 2 m long, at 10 m/s"
 
 
 def _true_law() -> AbstractDamper:
@@ -258,14 +256,16 @@ def record(screen: Screen, scenario: Scenario, folder: Path) -> BenchSet:
 def _rides(screen: Screen, scenario: Scenario, fits: Fitted) -> dict[str, dict[str, Response]]:
     """On a random road and over a bump: the true damper, the law with the largest error, and the recommended one."""
     random = roads.iso8608("C", speed=20.0, seed=scenario.seed)
-    surfaces: dict[str, AbstractRoad] = {ISO: random, BUMP: roads.cosine_bump(0.06, start=0.5, duration=0.2)}
+    iso = f"ISO 8608 class C at {display().speed(20.0)}"
+    bump = f"a bump, 60 mm high and 2 m long, at {display().speed(10.0)}"
+    surfaces: dict[str, AbstractRoad] = {iso: random, bump: roads.cosine_bump(0.06, start=0.5, duration=0.2)}
     comparison = fits.comparison
     both = (max(comparison.rungs, key=lambda rung: rung.error), comparison.best)
     cars = {name: _car(law) for name, law in {TRUE: scenario.law, **{r.name: r.result.law for r in both}}.items()}
     rides = {}
     for title, road in surfaces.items():
         whole = _driven(screen, cars, road, {"duration": scenario.duration}, f"Quarter car on {title}")
-        end = scenario.duration if title == ISO else min(scenario.duration, EVENT)  # one program for both lengths
+        end = scenario.duration if title == iso else min(scenario.duration, EVENT)  # one program for both lengths
         rides[title] = {name: response.between(0.0, end) for name, response in whole.items()}
         show_ride(screen, rides[title])
     return rides

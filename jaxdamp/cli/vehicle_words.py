@@ -42,9 +42,11 @@ def list_laws(screen: Screen) -> None:
 
 
 def parse_vehicle(word: str) -> MakeCar:
-    """The vehicle that a word means, as a function of a law for all its dampers, or of None for its own.
+    """The vehicle that a word means, as a function of a law for its dampers, or of None for its own.
 
-    A name out of `jaxdamp vehicles`; a JSON file of `export.to_json`; or a TOML file with a preset and other values:
+    A name out of `jaxdamp vehicles`, which puts the law where its description says (of truck_001 in front: the damper
+    of its tandem is the friction of the leaves); a JSON file of `export.to_json`, whose dampers all take it; or a TOML
+    file with a preset and other values:
 
         preset = "quarter_car_000"
 
@@ -67,11 +69,11 @@ def read_law(argument: str, path: Path) -> AbstractDamper:
     return read_module(argument, path, AbstractDamper, "a law", FROM_FIT)
 
 
-def read_baseline(path: Path, car: AbstractVehicle) -> AbstractVehicle:
-    """The vehicle of the option --baseline: this one with another law, or another one of its kind."""
-    kinds, words = (AbstractDamper, type(car)), f"a law or a {type(car).__name__}"
-    module = read_module("baseline", path, kinds, words, "`jaxdamp tune` writes law.json and vehicle.json.")
-    return with_law(car, module) if isinstance(module, AbstractDamper) else module
+def read_baseline(path: Path, make: MakeCar) -> AbstractVehicle:
+    """The vehicle of the option --baseline: the same with another law, as --start puts it in, or one of its kind."""
+    kind, remedy = type(make(None)), "`jaxdamp tune` writes law.json and vehicle.json."
+    module = read_module("baseline", path, (AbstractDamper, kind), f"a law or a {kind.__name__}", remedy)
+    return make(module) if isinstance(module, AbstractDamper) else module
 
 
 def read_module(argument: str, path: Path, kinds: type[T] | tuple[type[T], ...], words: str, remedy: str = "") -> T:

@@ -64,6 +64,11 @@ def forces_both_ways(laws: Sequence[AbstractDamper], velocity: Scalar) -> Float[
 
 
 def outer_forces(law: AbstractDamper, velocity: Scalar) -> list[float]:
-    """The sizes of the forces of an element [N] at its lowest and its highest level, at ± a velocity together."""
+    """The sizes of the forces of an element [N] at its lowest and its highest level, at ± a velocity together.
+
+    Arguments:
+        law: with a `Scheduled` law.
+        velocity: held [m/s].
+    """
     laws = laws_at_levels(law)
     return np.abs(forces_both_ways([laws[0], laws[-1]], velocity)).sum(axis=0).tolist()

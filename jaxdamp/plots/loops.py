@@ -17,7 +17,9 @@ from jaxdamp.plots.rides import unit_and_sign
 _MOST_POINTS, _PHASES = 300, 40  # of a residual over the velocity, and over the cycle
 
 
-def fit_loops(result: FitResult, runs: BenchRun | Sequence[BenchRun] | None = None, *, most: int = 6) -> Figure:
+def fit_loops(
+    result: FitResult, runs: BenchRun | Sequence[BenchRun] | None = None, *, most: int = 6, name: str = ""
+) -> Figure:
     """Loops of force over velocity and over stroke, measured and fitted, with the residual.
 
     For each record the last full cycle is drawn. Of many records only some are drawn, spread evenly over the peak
@@ -29,6 +31,7 @@ def fit_loops(result: FitResult, runs: BenchRun | Sequence[BenchRun] | None = No
         result: a fit.
         runs: records to show, for example held-out ones; those of the fit if left out.
         most: the largest number of records to draw.
+        name: of the law in the title; that of its class if left out.
 
     Raises:
         ValueError: no record.
@@ -77,7 +80,7 @@ def fit_loops(result: FitResult, runs: BenchRun | Sequence[BenchRun] | None = No
     ]
     several = len(shown) > 1  # one has its name in the title
     _style.legend_beside(figure, styles + handles * several, "record (peak velocity)" * several)
-    figure.suptitle(_title(result, runs, shown), x=0.01, ha="left", fontsize="medium")
+    figure.suptitle(_title(result, runs, shown, name), x=0.01, ha="left", fontsize="medium")
     return figure
 
 
@@ -129,12 +132,13 @@ def loops_by_law(comparison: Comparison, record: str | None = None) -> Figure:
     return figure
 
 
-def _title(result: FitResult, runs: Sequence[BenchRun], shown: Sequence[BenchRun]) -> str:
+def _title(result: FitResult, runs: Sequence[BenchRun], shown: Sequence[BenchRun], name: str) -> str:
     own = runs is result.runs
     percent, rmse = (result.fit_percent, result.rmse) if own else result.score(runs)[:2]
     new = not any(run is fitted for run in runs for fitted in result.runs)
     records = f"{runs[0].name if len(runs) == 1 else f'{len(runs)} records'}{' not fitted' * new}"
-    score = f"{_style.law_name(result.law)}: fit {percent:.1f} %, RMSE {_style.quantity(rmse, 'N')} on {records}"
+    name = name or _style.law_name(result.law)
+    score = f"{name}: fit {percent:.1f} %, RMSE {_style.quantity(rmse, 'N')} on {records}"
     return display().words(score) + (
         f"\n{len(shown)} of them shown, last full cycle of each" if len(shown) < len(runs) else ""
     )

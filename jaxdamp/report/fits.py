@@ -1,6 +1,7 @@
 """A page on laws fitted to records: errors, parameters, loops and curves, what the machine adds, doubts."""
 
 import dataclasses
+import functools
 from collections.abc import Mapping, Sequence
 from typing import Unpack
 
@@ -168,10 +169,11 @@ def add_fits(
     if best.judged_on:
         report.table(best.scores_table())
     add_findings(report, best.result)
-    report.picture(lambda: plots.fit_loops(best.result), f"{best.name} over the fitted records", "best_law_loops.png")
+    loops = functools.partial(plots.fit_loops, best.result, name=best.name)
+    report.picture(loops, f"{best.name} over the fitted records", "best_law_loops.png")
     if comparison.held_out:
         caption = f"{best.name} over the held-out records"
-        report.picture(lambda: plots.fit_loops(best.result, comparison.held_out), caption, "best_law_held_out.png")
+        report.picture(lambda: loops(comparison.held_out), caption, "best_law_held_out.png")
     if best.by_setting:
         report.table(best.by_setting.table())
         for left in best.by_setting.between:

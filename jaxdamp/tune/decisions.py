@@ -26,6 +26,7 @@ from jaxdamp.simulation import Ride
 from jaxdamp.tune.scenario_ride import ScenarioRide
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import RUN, Run
+from jaxdamp.tune.task import outside_ranges
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -199,7 +200,8 @@ def compare_dampers(
             ride = eqx.tree_at(lambda one: one.roads, ride, first.roads)
             units = {m.name: m.unit(car.units) for m in ride.metrics}
             by_damper[name], notes = _metrics_of(damper, vehicle, ride)
-            warnings += [f"{name}: {note}" for note in notes]
+            beyond, _ = outside_ranges(car, [lambda one, ride=ride: Ride(one, listed[0], metrics=ride.metrics, **run)])
+            warnings += [f"{name}: {note}" for note in (*notes, *(f"On the first road{text}" for text in beyond))]
     return _comparison(by_damper, units, warnings, len(listed))
 
 

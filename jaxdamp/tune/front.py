@@ -33,21 +33,25 @@ def non_dominated(values: Float[np.ndarray, "points objectives"]) -> Bool[np.nda
 @of_known_numbers
 def hypervolume(
     values: Float[np.ndarray, "points objectives"] | Sequence[Sequence[float]],
-    reference: Mapping[str, float] | Sequence[float] | Float[np.ndarray, " objectives"],
+    reference: Sequence[float] | Float[np.ndarray, " objectives"],
 ) -> float:
     """Volume of objectives that at least one point beats, up to a reference point, by slices along the last objective.
 
     Arguments:
         values: objectives of each point, shape (points, objectives).
-        reference: values that count as worst, one for each objective, such as the `reference` of a front.
+        reference: values that count as worst, one for each objective in their order.
 
     >>> hypervolume(np.array([[1.0, 2.0], [2.0, 1.0]]), np.array([3.0, 3.0]))
     3.0
     """
     values = np.asarray(values, float)
-    worst = np.array([*(reference.values() if isinstance(reference, Mapping) else reference)], float)
+    remedy = "Give one value for each objective: `[front.reference[name] for name in front.names]`."
+    if isinstance(reference, Mapping):
+        _checks.refuse("reference", "be numbers in the order of the columns of `values`", "a mapping", remedy)
+    worst = np.array([*reference], float)
+    if not np.all(np.isfinite(worst)):
+        _checks.refuse("reference", "be finite", worst.tolist(), remedy)
     if values.ndim != 2 or values.shape[1:] != worst.shape:
-        remedy = "Give one value for each objective, as `front.reference`."
         _checks.refuse("reference", "have one value for each column of `values`", f"of {worst.shape}", remedy)
     values = values[np.all(values < worst, axis=1)]
     if not len(values):
@@ -133,8 +137,14 @@ class ParetoFront(AbstractResult, Generic[V]):
 
     @property
     def knee(self) -> int:
-        """Number of the point with the best compromise: farthest from the plane through the ends of the front."""
-        return int(np.argmin(self.shares.sum(axis=1)))
+        """Number of the point with the best compromise: farthest from the plane through the ends of the front.
+
+        The ends are the points that are best in an objective. Where they give no plane, that of equal shares is taken.
+        """
+        ends = self.shares[np.argmin(self.shares, axis=0)]
+        flat = np.linalg.matrix_rank(ends) < len(ends)
+        normal = np.ones(len(ends)) if flat else np.linalg.solve(ends, np.ones(len(ends)))
+        return int(np.argmin(self.shares @ normal))
 
     @property
     def hypervolume(self) -> float:
@@ -143,12 +153,14 @@ class ParetoFront(AbstractResult, Generic[V]):
 
     def point(self, index: int) -> V:
         """The vehicle of a point, 0 for the best value of the first objective: for `export.to_json`, for a ride."""
-        if not -len(self) <= index < len(self):
+        if not hasattr(index, "__index__") or not -len(self) <= index < len(self):
             _checks.refuse("index", f"be that of a point, 0 to {len(self) - 1}", index)
         return self.free.build(jnp.asarray(self.designs[index], self.free.values.dtype))
 
     def metrics_of(self, vehicle: AbstractVehicle) -> dict[str, float]:
-        """Every metric of another vehicle on the same road, such as a baseline."""
+        """Every metric of another vehicle of the same kind on the same road, such as a baseline."""
+        must, remedy = f"be a {type(self.start).__name__}, as the start", "Compare vehicles of one kind."
+        _checks.instance("vehicle", vehicle, type(self.start), must, remedy)
         smooth = smooth_in_scenarios(self.measured.ride)
         values = self.measured.reported(self.measured.each(vehicle)) if smooth else self.measured(vehicle)
         return MetricValues.with_units({name: float(values[name]) for name in self.units}, self.units)

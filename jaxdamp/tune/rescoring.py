@@ -13,6 +13,7 @@ from jaxdamp._field_types import check_module
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._settings import with_defaults
 from jaxdamp._tables import Column, Compared, Contents, Table, comparison_table, plain
+from jaxdamp._traced import equal
 from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric
 from jaxdamp.roads import AbstractRoad, WhiteRoad
@@ -138,9 +139,10 @@ class Rescore(AbstractResult):
         head = f"On {np.count_nonzero(after < before)} of {self.roads} roads {self.metric} decreases"
         if self.metric not in self.in_percent:
             return f"{head}, from {before.mean():.4g} to {amount(after.mean(), self.units[self.metric])} on average."
-        gain = -100 * self.change(self.metric)
+        change = 100 * self.change(self.metric)
         error = f" ± {100 * self.half_width(self.metric):.1f}" if self.roads > 1 else ""
-        return f"{head}, by {gain.mean():.1f}{error} % on average ({gain.min():.0f} to {gain.max():.0f} %)."
+        ends = f"{change.min():+.0f} to {change.max():+.0f} %"
+        return f"{head}; it changes by {change.mean():+.1f}{error} % on average ({ends})."
 
     @property
     def in_percent(self) -> list[str]:
@@ -208,7 +210,11 @@ def rescore(
         _checks.refuse("roads", "be a list of one or more", _checks.described(roads), f"The call is `{call}`.")
     for i, road in enumerate(roads):
         if not isinstance(road, Scenarios):
-            check_module(f"roads[{i}]", road, (AbstractRoad, WhiteRoad), call)
+            check_module(f"roads[{i}]", road, (AbstractRoad,), call)
+        again = next((j for j in range(i) if equal(roads[j], road)), None)
+        if again is not None:
+            remedy = "Take several seeds: a road that counts twice makes the error of the mean too small."
+            _checks.refuse(f"roads[{i}]", "be another road than the others", f"roads[{again}] again", remedy)
     metrics, objective = list(result.start.ride_metrics), result.objective
     metrics += [m for m in (objective.metrics if objective else ()) if m not in metrics]
     units = {m.name: m.unit(result.start.units) for m in metrics} | (objective.units(result.start) if objective else {})

@@ -16,7 +16,7 @@ from jaxdamp.tune.minimising import minimise
 from jaxdamp.tune.objective import Function
 from jaxdamp.tune.result import ToleranceEffect, TuneResult, V
 from jaxdamp.tune.scenario_ride import Risk
-from jaxdamp.tune.scenarios import Road, Scenarios
+from jaxdamp.tune.scenarios import Road, Scenarios, check_scatter
 from jaxdamp.tune.sensitivities import SensitivitySettings, sensitivity
 from jaxdamp.tune.settings import DEFAULTS, RUN, Run, Settings
 from jaxdamp.vehicles import AbstractVehicle
@@ -124,12 +124,3 @@ def tolerance_effects(
         second = result.hessian[name][i, i] * (result.point[i] * s) ** 2 / value
         effects.append(ToleranceEffect(parameter, s, 0.5 * second, float(np.hypot(first, second / np.sqrt(2.0)))))
     return tuple(sorted(effects, key=lambda effect: -effect.deviation))
-
-
-def check_scatter(scatter: object) -> None:
-    """Refuse what is no mapping of parameters to positive standard deviations."""
-    remedy = "Write `{'damper.**_rate': 0.1}`: 0.1 is a standard deviation of 10 %."
-    if not isinstance(scatter, Mapping) or not scatter:
-        _checks.refuse("scatter", "be a mapping of one or more parameters", _checks.described(scatter), remedy)
-    for name, deviation in scatter.items():
-        _checks.positive(f"scatter[{name!r}]", deviation, remedy)

@@ -105,6 +105,7 @@ class Scenarios:
             must = "be a `tune.Condition(values, factors)`"
             remedy = "Write `tune.Condition({'sprung_mass': 1500.0})`."
             _checks.instance(f"conditions[{name!r}]", condition, Condition, must, remedy)
+            _checks.nonnegative(f"conditions[{name!r}].weight", condition.weight)
         of_roads = _weights(on, weights)
         pairs = list(itertools.product(on.items(), under.items()))
         shares = np.array([of_roads[road] * condition.weight for (road, _), (_, condition) in pairs])
@@ -187,20 +188,24 @@ def tolerances(scatter: Mapping[str, float], count: int, *, seed: int = 0) -> di
     """
     from scipy.stats import truncnorm
 
-    if not scatter:
-        _checks.refuse("scatter", "name one or more parameters", scatter, "Write `{'damper.**_rate': 0.05}`.")
-    for name, deviation in scatter.items():
-        if not 0.0 < deviation < 1.0 / 3.0:
-            remedy = "It is a standard deviation relative to the value: 0.05 is 5 %."
-            _checks.refuse(f"scatter[{name!r}]", "be above 0 and below 1/3", deviation, remedy)
-    if count < 1:
-        _checks.refuse("count", "be one or more", count)
+    check_scatter(scatter)
+    _checks.counts(count=count)
     unit = sobol_points(seed, len(scatter), 0, count)
     factors = 1.0 + truncnorm.ppf(unit, -3.0, 3.0) * np.array(list(scatter.values()))
     return {
         f"sample {i + 1}": Condition(factors=dict(zip(scatter, map(float, row), strict=True)))
         for i, row in enumerate(factors)
     }
+
+
+def check_scatter(scatter: object) -> None:
+    """Refuse what is no mapping of parameters to standard deviations relative to their values, below a third."""
+    remedy = "Write `{'damper.**_rate': 0.05}`: 0.05 is a standard deviation of 5 %."
+    if not isinstance(scatter, Mapping) or not scatter:
+        _checks.refuse("scatter", "be a mapping of one or more parameters", _checks.described(scatter), remedy)
+    for name, deviation in scatter.items():
+        if not isinstance(deviation, int | float) or not 0.0 < deviation < 1.0 / 3.0:
+            _checks.refuse(f"scatter[{name!r}]", "be above 0 and below 1/3", repr(deviation), remedy)
 
 
 @of_known_numbers

@@ -11,7 +11,7 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._pieces import piece
 from jaxdamp._settings import part
-from jaxdamp.dampers import has_fitted_range
+from jaxdamp.dampers import RangeUse, has_fitted_range
 from jaxdamp.metrics import Metric, current_name
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import (
@@ -61,18 +61,28 @@ def range_notes(
 
     On a white road, velocities up to three standard deviations are compared.
     """
-    if not rides or not has_fitted_range((start, tuned)):
+    if not rides:
         return [], []
     notes, uses = [], {}
     for when, vehicle in (("At the start", start), ("After the tuning", tuned)):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", CoarseStepWarning)  # reported by the notes on the step
-            ridden = [ride_of(vehicle) for ride_of in rides]
-        white = isinstance(ridden[0].road, WhiteRoad)
-        reach = f" (velocities of {DEVIATIONS:g} standard deviations)" if white else ""
-        uses = over_runs([ride.range_use() for ride in ridden])
-        notes += [f"{when}{reach}, {sentence}" for sentence in range_sentences(uses)]
+        sentences, uses = outside_ranges(vehicle, rides)
+        notes += [f"{when}{sentence}" for sentence in sentences]
     return notes, far_outside(uses)
+
+
+def outside_ranges(
+    vehicle: AbstractVehicle, rides: Sequence[Callable[[AbstractVehicle], Ride]]
+) -> tuple[list[str], dict[str, list[RangeUse]]]:
+    """The end of a sentence for each damper used outside its fitted range, and what is used of each range."""
+    if not has_fitted_range(vehicle):
+        return [], {}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", CoarseStepWarning)  # reported by the notes on the step
+        ridden = [ride_of(vehicle) for ride_of in rides]
+    white = isinstance(ridden[0].road, WhiteRoad)
+    reach = f" (velocities of {DEVIATIONS:g} standard deviations)" if white else ""
+    uses = over_runs([ride.range_use() for ride in ridden])
+    return [f"{reach}, {sentence}" for sentence in range_sentences(uses)], uses
 
 
 class Tolerance(NamedTuple):

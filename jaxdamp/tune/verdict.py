@@ -10,7 +10,7 @@ import numpy as np
 from jaxdamp._status import Status
 from jaxdamp.metrics import Metric
 from jaxdamp.solve import Evaluation
-from jaxdamp.tune.limits import WITHIN, Limit, LimitRange, amount, excess, in_each, lost_limits
+from jaxdamp.tune.limits import Limit, LimitRange, amount, excess, in_each, lost_limits
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.ranges import FACTOR, Change, SearchRange
 from jaxdamp.tune.smooth import exact_counterpart
@@ -179,7 +179,7 @@ def _limits_in_words(result: "TuneResult[AbstractVehicle]") -> str:
         text = f"{name} {share}{', ' * (name in result.active_limits)}{at_limit(result, name)}"
         if (fresh := result.fresh) is not None and name in result.allowed:
             over = [excess(fresh, one, span) for one, span in _allowed(result, name).items()]
-            beyond = int(np.sum(np.max(over, axis=0) > WITHIN))
+            beyond = int(np.sum(np.max(over, axis=0) > 1e-9))  # what is more than rounding
             text += f", beyond it on {beyond} of {fresh.roads} fresh roads" * bool(beyond)
         texts.append(text)
     return f"; limits: {'; '.join(texts)}" if texts else ""

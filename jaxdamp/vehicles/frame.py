@@ -246,7 +246,13 @@ def lift_off(wheel: Wheel, static_load: Scalar) -> AbstractDamper:
 def tangent_stiffness(
     form: PortForm, laws: Sequence[AbstractDamper], position: Float[Array, " q"]
 ) -> Float[Array, "q q"]:
-    """K + Pᵀ (∂F/∂x) P: the stiffness [N/m] with that of the laws at rest at a position on level ground."""
+    """K + Pᵀ (∂F/∂x) P: the stiffness [N/m] with that of the laws at rest at a position on level ground.
+
+    Arguments:
+        form: of the vehicle.
+        laws: at its ports.
+        position: the coordinates [m, rad].
+    """
     if not any(law.traits().stroke_dependent_at_rest for law in laws):
         return form.stiffness
     stiffness, _ = Ports(laws).stiffness_and_damping(form.ports @ position)

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from jaxdamp import roads, simulate, vehicles
+from jaxdamp._traced import equal
 from jaxdamp.cli.application import own_words
 from jaxdamp.cli.controlling import parse_policy
 from jaxdamp.cli.jobs import with_step_warnings
 from jaxdamp.cli.riding import Driving, parse_road
-from jaxdamp.cli.vehicle_words import presets
+from jaxdamp.cli.vehicle_words import parse_vehicle, presets, read_baseline, read_law
 from jaxdamp.cli.wording import in_command_line
 from jaxdamp.control import Controlled, Skyhook
 from jaxdamp.dampers import AbstractDamper, Bilinear, Linear, Scheduled
@@ -163,6 +164,13 @@ def test_every_preset_with_a_damper_takes_the_law() -> None:
     for make in presets().values():
         laws = make(damper=Linear(1234.0)).elements()
         assert any("1234.0" in repr(law) for law in laws)
+
+
+def test_a_law_as_baseline_stands_where_it_stands_as_start(law: Path) -> None:
+    """Of the truck in front: its tandem has the friction of its leaves."""
+    make = parse_vehicle("truck_001")
+    assert equal(read_baseline(law, make), make(read_law("start", law)))
+    assert equal(make(None).tandem.damper, make(read_law("start", law)).tandem.damper)  # type: ignore[attr-defined]
 
 
 def test_how_long_a_road_is_driven() -> None:

@@ -1,12 +1,13 @@
 import dataclasses
 import json
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
 import pytest
 
 from jaxdamp import Ride, dampers, parameters, roads, tune, vehicles
+from jaxdamp.dampers import FittedRange, with_fitted_range
 from jaxdamp.tune.decisions import _check, _effects
 
 
@@ -104,6 +105,16 @@ def test_values_are_those_of_rides_and_common_roads_cancel(on_roads):
     assert d.from_roads < 0.2 * alone
     assert d.margin > 1.96 * np.hypot(d.from_roads, d.from_parameters)  # Student's t of seven degrees of freedom
     assert found.parameter_errors["A"][COMFORT] == 0.0 and found.parameter_errors["B"][COMFORT] > 0.0
+
+
+@pytest.mark.parametrize("white", [True, False])
+def test_laws_beyond_their_records_are_warned_of(white):
+    slow = with_fitted_range(dampers.Linear(2500.0), FittedRange(velocity=(-0.05, 0.05)))
+    on = WHITE if white else [roads.iso8608("C", 20.0, 30.0, seed=seed) for seed in (1, 2)]
+    run: Any = {} if white else {"duration": 0.5, "dt": 2e-3}
+    laws = {"A": slow, "B": dampers.Linear(3000.0)}
+    (warning,) = tune.compare_dampers(laws, quarter_car, on, metrics=[COMFORT], **run).warnings
+    assert warning.startswith("A: On the first road") and "fitted to −0.05 to 0.05 m/s" in warning
 
 
 def test_table_dictionary_and_picture(on_roads):

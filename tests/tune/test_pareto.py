@@ -1,3 +1,4 @@
+import dataclasses
 import json
 from typing import Any
 
@@ -52,8 +53,17 @@ def test_knee_hypervolume_and_reference(front):
     assert reference == pytest.approx(fine.max(axis=0) + 0.1 * np.ptp(fine, axis=0), rel=3e-5)
     full = tune.hypervolume(fine, reference)
     assert 0.9 * full < front.hypervolume < full
-    for given in (front.reference, list(reference)):
-        assert tune.hypervolume(front.objectives.tolist(), given) == pytest.approx(front.hypervolume)
+    assert tune.hypervolume(front.objectives.tolist(), list(reference)) == pytest.approx(front.hypervolume)
+
+
+def test_the_knee_is_farthest_from_the_plane_through_the_ends(front):
+    """Ends of three objectives that are not the worst in all others: the sum of shares is no distance from them."""
+    values = np.array([[0.0, 0.94, 1.0], [0.21, 0.0, 0.42], [1.0, 1.0, 0.0], [0.1, 0.45, 0.5], [0.3, 0.4, 0.3]])
+    names = ("a", "b", "c")
+    of_three = dataclasses.replace(front, names=names, values=dict(zip(names, values.T, strict=True)))
+    normal = np.cross(values[1] - values[0], values[2] - values[0])
+    distance = np.abs((values - values[0]) @ normal) / np.linalg.norm(normal)
+    assert of_three.knee == np.argmax(distance) != np.argmin(values.sum(axis=1))
 
 
 def test_every_point_is_a_vehicle_that_can_be_written(front):

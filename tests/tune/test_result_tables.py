@@ -65,8 +65,8 @@ def test_other_roads_stand_in_a_table_but_for_what_has_no_change() -> None:
     name, unit, before, after, change, smallest, largest = row
     assert (name, unit, before, after) == ("rms_sprung_acceleration", "m/s²", 1.5, 0.95)
     assert (change, smallest, largest) == pytest.approx((-30.0, -50.0, -10.0))
-    words = "by 30.0 ± 254.1 % on average (10 to 50 %)."
-    assert FRESH.summary == f"On 2 of 2 roads rms_sprung_acceleration decreases, {words}"
+    words = "it changes by -30.0 ± 254.1 % on average (-50 to -10 %)."
+    assert FRESH.summary == f"On 2 of 2 roads rms_sprung_acceleration decreases; {words}"
     assert repr(FRESH).startswith(FRESH.summary)
     data = json.loads(json.dumps(FRESH.to_dict(), allow_nan=False))
     assert data["metrics"]["lift_off_fraction"] == {"before": [0.0, 0.1], "after": [0.1, 0.1], "unit": ""}

@@ -55,6 +55,13 @@ def test_a_verdict_outside_the_records_says_so_also_where_nothing_is_better():
         assert "by the law, but outside its records (damper at 5 times" in result.verdict.sentence
 
 
+def test_every_fresh_road_beyond_a_limit_is_counted():
+    """Also those by less than the percent within which a limit counts as held."""
+    tyre = [1.095, 1.0999, 1.1004, 1.108, 1.2]
+    result = made_up([0.9] * 5, tyre, [1.0] * 5, active_limits=(TYRE,))
+    assert "at its limit, beyond it on 3 of 5 fresh roads" in result.verdict.sentence
+
+
 @pytest.mark.parametrize(("metrics", "outcome", "words"), CASES, ids=[case[1].name for case in CASES])
 def test_the_verdict_is_that_of_the_fresh_roads(metrics, outcome, words):
     result = made_up(*metrics)

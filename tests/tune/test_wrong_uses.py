@@ -85,7 +85,7 @@ CASES = [
         lambda: tune.robust(COMFORT, CAR, tune.Scenarios([WHITE]), scatter={"rate": -1.0}),
         "scatter['rate']",
         "-1.0",
-        "standard deviation of 10 %",
+        "standard deviation of 5 %",
     ),
     (lambda: tune.tolerance_effects(COMFORT, CAR, WHITE, {}), "scatter", "a dict of 0", "Write `{'damper"),
     (lambda: tune.tolerance_effects([COMFORT, TYRE], CAR, WHITE, {"rate": 0.1}), "metric", "a list", "once"),
@@ -109,6 +109,20 @@ CASES = [
     (lambda: compare(roads=[BUMP, BUMP]), "roads[1]", "roads[0] again", "several seeds"),
     (lambda: compare(roads=[WHITE, WHITE]), "roads[0]", "a WhiteRoad", "roads.iso8608"),
     (lambda: tune.hypervolume(np.zeros((2, 2)), np.zeros(3)), "reference", "(3,)", "front.reference"),
+    (lambda: tune.hypervolume(np.zeros((2, 2)), {"a": 1.0, "b": 2.0}), "reference", "a mapping", "front.names"),
+    (lambda: tune.hypervolume(np.zeros((2, 2)), [np.nan, 2.0]), "reference", "[nan, 2.0]", "front.names"),
+    (lambda: tune.rescore(tuned(), [BUMP, BUMP]), "roads[1]", "roads[0] again", "several seeds"),
+    (lambda: tune.rescore(tuned(), [WHITE]), "roads[0]", "a WhiteRoad", "roads.iso8608"),
+    (lambda: tune.CVaR("10%"), "share", "10%", "the worst tenth"),  # pyright: ignore
+    (lambda: tune.tolerances({"rate": 0.1}, 2.5), "count", "the number 2.5", ""),  # pyright: ignore
+    (lambda: tune.tolerances({"rate": "10%"}, 2), "scatter['rate']", "'10%'", "0.05 is"),  # pyright: ignore
+    (lambda: tune.tolerance_effects(COMFORT, CAR, WHITE, {"rate": 10.0}), "scatter['rate']", "10.0", "0.05 is"),
+    (
+        lambda: tune.Scenarios([WHITE], [tune.Condition(weight="1")]),  # pyright: ignore
+        "conditions['condition 1'].weight",
+        "the text '1'",
+        "",
+    ),
 ]
 
 
