@@ -76,8 +76,10 @@ class CVaR:
     share: float
 
     def __post_init__(self) -> None:
-        if not isinstance(self.share, int | float) or not 0.0 < self.share <= 1.0:
-            _checks.refuse("share", "be above 0 and up to 1", self.share, "0.1 is the worst tenth of the scenarios.")
+        remedy = "0.1 is the worst tenth of the scenarios."
+        _checks.positive("share", self.share, remedy)
+        if not self.share <= 1.0:
+            _checks.refuse("share", "be above 0 and up to 1", self.share, remedy)
 
     def __call__(self, values: Values, weights: Values) -> Scalar:
         """The mean of the worst share."""

@@ -204,8 +204,9 @@ def check_scatter(scatter: object) -> None:
     if not isinstance(scatter, Mapping) or not scatter:
         _checks.refuse("scatter", "be a mapping of one or more parameters", _checks.described(scatter), remedy)
     for name, deviation in scatter.items():
-        if not isinstance(deviation, int | float) or not 0.0 < deviation < 1.0 / 3.0:
-            _checks.refuse(f"scatter[{name!r}]", "be above 0 and below 1/3", repr(deviation), remedy)
+        _checks.positive(f"scatter[{name!r}]", deviation, remedy)
+        if not deviation < 1.0 / 3.0:
+            _checks.refuse(f"scatter[{name!r}]", "be above 0 and below 1/3", deviation, remedy)
 
 
 @of_known_numbers
