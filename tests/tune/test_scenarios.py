@@ -133,7 +133,7 @@ WRONG_SCENARIOS = [
     (lambda: tune.Scenarios(WHITE, weights=[1.0]), "be one for each road"),
     (lambda: tune.Scenarios(WHITE, weights=[1.0, -1.0]), "be 0 or more"),
     (lambda: tune.Scenarios(WHITE, risk="median"), "`risk` must be one of 'mean', 'worst'"),
-    (lambda: tune.CVaR(0.0), "`share` must be above 0"),
+    (lambda: tune.CVaR(0.0), "`share` must be positive and finite"),
     (lambda: tune.tolerances({}, 2), "be a mapping of one or more parameters"),
     (lambda: tune.tolerances({"rate": 5.0}, 2), "0.05 is a standard deviation of 5 %"),
     (lambda: tune.tolerances({"rate": 0.1}, 0), "`count` must be 1 or more"),
