@@ -162,7 +162,7 @@ def ride(
     own, name = with_dampers_at(make(law), command), "vehicle" if law is None else "law"
     cars = {name: controlling.of(own, law)}
     if baseline is not None or controlling.controller is not None:  # at its own command
-        cars = {"baseline": own if baseline is None else read_baseline(baseline, make)} | cars
+        cars = {"baseline": own if baseline is None else read_baseline(baseline, own, vehicle)} | cars
     (surface,), run = driving.over(road)
     if not isinstance(surface, AbstractRoad):
         refuse_road(road)

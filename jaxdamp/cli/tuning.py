@@ -115,8 +115,8 @@ def tune_command(
         baseline: to compare with: another law, or another tuning's vehicle.json, as JSON.
     """
     law = None if start is None else read_law("start", start)
-    make = parse_vehicle(vehicle)
-    car, beside = make(law), None if baseline is None else read_baseline(baseline, make)
+    car = parse_vehicle(vehicle)(law)
+    beside = None if baseline is None else read_baseline(baseline, car, vehicle)
     surfaces, run = _realisations(road, driving, roads)
     car = controlling.of(car, law)
     if controlling.controller is not None:
@@ -233,8 +233,7 @@ def sweep_command(
         block: compute this part of the sweep only, into a store; pip install 'jaxdamp[cluster]'.
     """
     store = output.store("sweep")
-    make = parse_vehicle(vehicle)
-    car = with_dampers_at(make(None if start is None else read_law("start", start)), command)
+    car = with_dampers_at(parse_vehicle(vehicle)(None if start is None else read_law("start", start)), command)
     (surface,), run = driving.over(road)
     white = isinstance(surface, WhiteRoad)
     stated, said = in_si(limit or {}, car, white=white)
@@ -242,7 +241,7 @@ def sweep_command(
     names = [name for word in metric for name in _metrics_of("metric", word, car, white=white)]
     names = list(dict.fromkeys([*names, *limits]))
     limit_spans(limits, names, dict.fromkeys(names, 1.0))  # refuses what is no limit before anything is driven
-    beside = None if baseline is None else read_baseline(baseline, make)
+    beside = None if baseline is None else read_baseline(baseline, car, vehicle)
     ride = Ride(car, surface, metrics=names, **run)
     axes = grid(axes_in_si(over, car)).values
     ride({name: values[0] for name, values in axes.items() if not ride.out_of_domain({name: values[:1]})[0]})

@@ -98,7 +98,7 @@ class DamperComparison(AbstractResult):
         road_errors: standard error of the mean of each metric due to the choice of roads, likewise.
         differences: from the first damper to each other one.
         units: of the metrics.
-        warnings: parameters that no record determines but that matter here.
+        warnings: parameters that no record determines but that matter here, and laws used outside their records.
     """
 
     values: dict[str, dict[str, Float[np.ndarray, " roads"]]]
@@ -165,9 +165,8 @@ def compare_dampers(
     The uncertainty has two sources. The parameters of a fitted law are uncertain: their covariance is carried to each
     metric by exact derivatives (to first order). A random road is one of many: the scatter from road to road gives the
     standard error of a mean. All dampers drive over the same roads, so most of this scatter cancels in a difference.
-    The errors of different fits are taken as independent. A white road has no scatter.
-
-    Neither source includes a law of the wrong form: look at the residuals of the fits.
+    The errors of different fits are taken as independent. A white road has no scatter. Neither source includes a law of
+    the wrong form: look at the residuals of the fits, and at `warnings` on the range of their records.
 
     Arguments:
         dampers: two or more by name, the first of which is the one to compare with: results of `identify.fit`, or laws,
@@ -211,14 +210,11 @@ def _comparison(
     """The metrics of all dampers, and the differences from the first to each other one."""
     order, (first, *others) = list(units), list(by_damper)
     by_metric = {name: dict(zip(order, one.values.T, strict=True)) for name, one in by_damper.items()}
+    errors = {name: np.sqrt(one.variance).tolist() for name, one in by_damper.items()}
     return DamperComparison(
         values=by_metric,
-        parameter_errors={
-            name: dict(zip(order, map(float, np.sqrt(one.variance)), strict=True)) for name, one in by_damper.items()
-        },
-        road_errors={
-            name: {metric: _standard_error(values[metric]) for metric in order} for name, values in by_metric.items()
-        },
+        parameter_errors={n: dict(zip(order, one, strict=True)) for n, one in errors.items()},
+        road_errors={n: {m: _standard_error(each[m]) for m in order} for n, each in by_metric.items()},
         differences=tuple(
             _difference(name, metric, by_damper[first], by_damper[name], i, roads)
             for name in others

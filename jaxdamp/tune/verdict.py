@@ -179,7 +179,7 @@ def _limits_in_words(result: "TuneResult[AbstractVehicle]") -> str:
         text = f"{name} {share}{', ' * (name in result.active_limits)}{at_limit(result, name)}"
         if (fresh := result.fresh) is not None and name in result.allowed:
             over = [excess(fresh, one, span) for one, span in _allowed(result, name).items()]
-            beyond = int(np.sum(np.max(over, axis=0) > 1e-9))  # what is more than rounding
+            beyond = int(np.sum(np.max(over, axis=0) > _ROUNDING))
             text += f", beyond it on {beyond} of {fresh.roads} fresh roads" * bool(beyond)
         texts.append(text)
     return f"; limits: {'; '.join(texts)}" if texts else ""

@@ -166,11 +166,15 @@ def test_every_preset_with_a_damper_takes_the_law() -> None:
         assert any("1234.0" in repr(law) for law in laws)
 
 
-def test_a_law_as_baseline_stands_where_it_stands_as_start(law: Path) -> None:
+def test_a_law_as_baseline_stands_where_it_stands_as_start(law: Path, tmp_path: Path) -> None:
     """Of the truck in front: its tandem has the friction of its leaves."""
-    make = parse_vehicle("truck_001")
-    assert equal(read_baseline(law, make), make(read_law("start", law)))
-    assert equal(make(None).tandem.damper, make(read_law("start", law)).tandem.damper)  # type: ignore[attr-defined]
+    own, start = parse_vehicle("truck_001")(None), parse_vehicle("truck_001")(read_law("start", law))
+    assert equal(read_baseline(law, own, "truck_001"), start) and not equal(own, start)
+    file = tmp_path / "car.toml"
+    file.write_text('preset = "quarter_car_000"\n[parameters]\ndamper.rebound_rate = 900.0\n')
+    car = parse_vehicle(str(file))(Bilinear(1000.0, 1000.0))
+    assert equal(car.damper, Bilinear(900.0, 1000.0))  # type: ignore[attr-defined]
+    assert equal(read_baseline(law, car, str(file)).damper, read_law("start", law))  # type: ignore[attr-defined]
 
 
 def test_how_long_a_road_is_driven() -> None:

@@ -280,7 +280,7 @@ fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real nominal[]
         for (i = 0; i < n; ++i) nominal[i] = fmax(nominal[i], fabs(carry[i]));
     }
     for (i = 0; i < n; ++i)
-        if (!(nominal[i] > 0.0 && nominal[i] < HUGE_VAL)) nominal[i] = 1.0;
+        if (!(nominal[i] > 1e-12 && nominal[i] < HUGE_VAL)) nominal[i] = 1.0; /* nothing but rounding */
     return fmi2OK;
 }
 
