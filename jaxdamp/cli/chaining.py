@@ -47,8 +47,8 @@ def report(
     """The whole chain on one page: bench records, fitted laws, rides on the best one, and its tuning.
 
     Writes the laws, the tuned vehicle, tables, pictures and the page. The vehicle rides with its own dampers, with the
-    fitted law (of truck_001 in front), and with the tuned laws. Nothing is tuned if the law has no parameter that a
-    workshop can change and that the records determine. Ends with exit code 1 if a limit is not met.
+    fitted law, and with the tuned laws. Nothing is tuned if the law has no parameter that a workshop can change and
+    that the records determine. Ends with exit code 1 if a limit is not met.
 
     Arguments:
         law: names of laws to fit, see "jaxdamp laws": "linear,besinger"; or "all"; six that suit the records if left

@@ -115,7 +115,7 @@ SHARED = {  # help of the words that several commands take, unless the docstring
     "law": "a law as JSON, such as best_law.json of jaxdamp fit.",
     "vehicle": 'a published vehicle, see "jaxdamp vehicles"; or a file of one, *.json or *.toml.',
     "road": "iso:A to iso:H, bump:HEIGHT:LENGTH [m], or a file: *.crg, or text of position, height.",
-    "start": "a law as JSON for the dampers, instead of the vehicle's own; of truck_001 for those in front.",
+    "start": "a law as JSON for the dampers, instead of the vehicle's own; seats and cabs keep theirs.",
     "baseline": "another law to compare with, as JSON.",
     "report": "write the page to this file too: fit.html.",
     "group_by": 'setting of the manifest to divide the records by, or "command".',

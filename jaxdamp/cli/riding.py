@@ -150,9 +150,8 @@ def ride(
 ) -> None:
     """Ride on a road: metrics, comfort by ISO 2631-1 and pictures, beside a baseline.
 
-    The vehicle has its own dampers, or the law of --start (of truck_001 in front, as its tandem has the friction of its
-    leaves). The channels over time, channels_*.csv, are in SI and positive in rebound whatever units and sign are
-    shown.
+    The vehicle has its own dampers, or the law of --start. The channels over time, channels_*.csv, are in SI and
+    positive in rebound whatever units and sign are shown.
 
     Arguments:
         command: what is set on the dampers, such as clicks or a coil current; that of their laws if left out.
@@ -162,7 +161,7 @@ def ride(
     own, name = with_dampers_at(make(law), command), "vehicle" if law is None else "law"
     cars = {name: controlling.of(own, law)}
     if baseline is not None or controlling.controller is not None:  # at its own command
-        cars = {"baseline": own if baseline is None else read_baseline(baseline, own, vehicle)} | cars
+        cars = {"baseline": own if baseline is None else read_baseline(baseline, own)} | cars
     (surface,), run = driving.over(road)
     if not isinstance(surface, AbstractRoad):
         refuse_road(road)

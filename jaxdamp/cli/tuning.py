@@ -116,7 +116,7 @@ def tune_command(
     """
     law = None if start is None else read_law("start", start)
     car = parse_vehicle(vehicle)(law)
-    beside = None if baseline is None else read_baseline(baseline, car, vehicle)
+    beside = None if baseline is None else read_baseline(baseline, car)
     surfaces, run = _realisations(road, driving, roads)
     car = controlling.of(car, law)
     if controlling.controller is not None:
@@ -241,7 +241,7 @@ def sweep_command(
     names = [name for word in metric for name in _metrics_of("metric", word, car, white=white)]
     names = list(dict.fromkeys([*names, *limits]))
     limit_spans(limits, names, dict.fromkeys(names, 1.0))  # refuses what is no limit before anything is driven
-    beside = None if baseline is None else read_baseline(baseline, car, vehicle)
+    beside = None if baseline is None else read_baseline(baseline, car)
     ride = Ride(car, surface, metrics=names, **run)
     axes = grid(axes_in_si(over, car)).values
     ride({name: values[0] for name, values in axes.items() if not ride.out_of_domain({name: values[:1]})[0]})

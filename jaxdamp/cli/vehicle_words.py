@@ -1,7 +1,7 @@
 """What vehicles and laws are called on the command line: `jaxdamp vehicles`, `jaxdamp laws`, and files."""
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TypeVar
 
@@ -12,12 +12,12 @@ from jaxdamp._tables import Contents
 from jaxdamp._traced import equal
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.early import EXAMPLE, FROM_FIT, read_json, read_vehicle
-from jaxdamp.dampers import AbstractDamper, Linear, check_commands, takes_command, with_command
+from jaxdamp.dampers import AbstractDamper, check_commands, takes_command, with_command
 from jaxdamp.identify import laws_table
-from jaxdamp.parameters import get, matching, replace
+from jaxdamp.parameters import get, matching, modules_inside, replace
 from jaxdamp.report import Column, Table
 from jaxdamp.tune import damper_paths
-from jaxdamp.vehicles import AbstractVehicle
+from jaxdamp.vehicles import AbstractVehicle, Cab, Seat
 
 
 T = TypeVar("T")
@@ -44,9 +44,7 @@ def list_laws(screen: Screen) -> None:
 def parse_vehicle(word: str) -> MakeCar:
     """The vehicle that a word means, as a function of a law for its dampers, or of None for its own.
 
-    A name out of `jaxdamp vehicles`, which puts the law where its description says (of truck_001 in front: the damper
-    of its tandem is the friction of the leaves); a JSON file of `export.to_json`, whose dampers all take it; or a TOML
-    file with a preset and other values:
+    A name out of `jaxdamp vehicles`, a JSON file of `export.to_json`, or a TOML file with a preset and other values:
 
         preset = "quarter_car_000"
 
@@ -69,21 +67,11 @@ def read_law(argument: str, path: Path) -> AbstractDamper:
     return read_module(argument, path, AbstractDamper, "a law", FROM_FIT)
 
 
-def read_baseline(path: Path, car: AbstractVehicle, vehicle: str) -> AbstractVehicle:
+def read_baseline(path: Path, car: AbstractVehicle) -> AbstractVehicle:
     """The vehicle of the option --baseline: this one with another law, as --start puts it in, or one of its kind."""
     kinds, words = (AbstractDamper, type(car)), f"a law or a {type(car).__name__}"
     module = read_module("baseline", path, kinds, words, "`jaxdamp tune` writes law.json and vehicle.json.")
-    return with_law(car, module, _law_places(car, vehicle)) if isinstance(module, AbstractDamper) else module
-
-
-def _law_places(car: AbstractVehicle, word: str) -> list[str]:
-    """The paths of the dampers that take the law of --start in the vehicle of this word."""
-    file, places = Path(word).expanduser(), damper_places(car)
-    if file.suffix == ".json":
-        return places
-    law = Linear(1.0)
-    preset = presets()[str(read_vehicle(file)["preset"]) if file.suffix == ".toml" else word](damper=law)
-    return [path for path in places if equal(get(preset, path), law)]
+    return with_law(car, module) if isinstance(module, AbstractDamper) else module
 
 
 def read_module(argument: str, path: Path, kinds: type[T] | tuple[type[T], ...], words: str, remedy: str = "") -> T:
@@ -113,9 +101,11 @@ def _flat(values: Mapping[str, object], prefix: str = "") -> list[tuple[str, obj
     return found
 
 
-def with_law(vehicle: AbstractVehicle, law: AbstractDamper, places: Sequence[str] | None = None) -> AbstractVehicle:
-    """The vehicle with a law at these of its dampers; at all of them, whose path ends with "damper", if left out."""
-    for path in damper_places(vehicle) if places is None else places:
+def with_law(vehicle: AbstractVehicle, law: AbstractDamper) -> AbstractVehicle:
+    """The vehicle with a law at its dampers, but for those of seats and of a cab, which keep their own."""
+    mounts = [prefix for prefix, part in modules_inside(vehicle) if isinstance(part, Seat | Cab)]
+    places = damper_places(vehicle)
+    for path in [path for path in places if not path.startswith((*mounts,))] or places:
         vehicle = eqx.tree_at(lambda car, path=path: get(car, path), vehicle, law)
     return vehicle
 

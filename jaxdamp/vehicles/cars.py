@@ -5,6 +5,7 @@ from typing import final
 import equinox as eqx
 
 from jaxdamp._types import Number, Scalar
+from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import parameter, positive
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.corner import AbstractCorner, Axle, Corner
@@ -129,6 +130,7 @@ class QuarterCar(AbstractCorner, _SprungMass):  # in this order, the sprung mass
     12993.81
     """
 
+    damper: AbstractDamper  # pyright: ignore[reportIncompatibleVariableOverride]  # never None
     seats: tuple[Seat, ...] = ()
     damper_count: int = eqx.field(static=True, default=1)
 

@@ -17,7 +17,7 @@ class AbstractCorner(Module):
     unsprung_mass: Number = parameter("kg", "mass of wheel and hub", positive, adjustable=False)
     spring_rate: Number = parameter("N/m", "suspension spring rate at the wheel", positive)
     tyre_stiffness: Number = parameter("N/m", "vertical tyre stiffness", positive, adjustable=False)
-    damper: AbstractDamper
+    damper: AbstractDamper | None
     tyre_damping: Number = parameter("N s/m", "vertical tyre damping", nonnegative, default=0.0, adjustable=False)
     extra_spring: AbstractDamper | None = None
     bump_stop: AbstractDamper | None = None
@@ -64,7 +64,7 @@ class Corner(AbstractCorner, AbstractPart):
         spring_rate: linear suspension spring at the wheel [N/m].
         tyre_stiffness: vertical tyre stiffness [N/m].
         damper: law at the wheel; `dampers.MotionRatio(law, ratio)` if the damper has another travel than the wheel,
-            `dampers.Linkage(law, travel, ratio)` if their ratio changes with the stroke.
+            `dampers.Linkage(law, travel, ratio)` if their ratio changes with the stroke; None for no damper.
         tyre_damping: vertical tyre damping [N s/m].
         extra_spring: law parallel to the linear spring, such as `CubicSpring` or `dampers.GasSpring`.
         bump_stop: law such as `dampers.BumpStop`.

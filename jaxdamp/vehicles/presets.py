@@ -79,9 +79,10 @@ def truck_001(
     axle_mass, spread, wheelbase, leaves = 1100.0, 1.3, 4.5, 2 * 1195e3
     if walking_beam:
         inertia = 2 * axle_mass * (spread / 2) ** 2
-        tandem = WalkingBeam(2 * axle_mass, inertia, spread, leaves, 4 * 1100e3, Linear(40e3), 4 * 500.0)
+        tandem = WalkingBeam(2 * axle_mass, inertia, spread, leaves, 4 * 1100e3, None, 4 * 500.0, friction=Linear(40e3))
     else:
-        tandem = IndependentTandem(Corner(axle_mass, leaves / 2, 4 * 1100e3, Linear(20e3), 4 * 500.0), spread)
+        axle = Corner(axle_mass, leaves / 2, 4 * 1100e3, None, 4 * 500.0, friction=Linear(20e3))
+        tandem = IndependentTandem(axle, spread)
     ahead, behind = 6900.0 - 700.0, 18_000.0 - 2 * axle_mass
     sprung = ahead + behind
     distances = wheelbase * behind / sprung, wheelbase * ahead / sprung

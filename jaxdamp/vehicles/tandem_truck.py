@@ -18,7 +18,7 @@ from jaxdamp.vehicles.suspension import Seat, Suspension, seat_parts
 class WalkingBeam(AbstractPart):
     """Two axles at the ends of a beam with a leaf spring at its middle: both wheels carry the same load at rest.
 
-    m_b z̈_b = P − F_t1 − F_t2,  J_b ψ̈ = −(s/2)(F_t1 − F_t2), with the force P of the spring and of the damper at the
+    m_b z̈_b = P − F_t1 − F_t2,  J_b ψ̈ = −(s/2)(F_t1 − F_t2), with the force P of the spring and of the laws at the
     middle. Only the tyres damp the pitch of the beam: with c_t = 0 its mode √(k_t s²/(2 J_b)) is undamped, the known
     weakness of walking beams.
 
@@ -28,7 +28,7 @@ class WalkingBeam(AbstractPart):
         spread: s, distance between the two axles [m].
         spring_rate: rate of the leaf spring, both sides together [N/m].
         tyre_stiffness: k_t of each axle [N/m].
-        damper: law at the middle, both sides together.
+        damper: law at the middle, both sides together; None for a beam without dampers.
         tyre_damping: vertical damping of the tyres of each axle [N s/m].
         tyre_lifts: whether the tyres can lift off.
         extra_spring: law parallel to the leaf spring, both sides together.
@@ -41,7 +41,7 @@ class WalkingBeam(AbstractPart):
     spread: Number = parameter("m", "distance between the two axles", positive, adjustable=False)
     spring_rate: Number = parameter("N/m", "rate of the leaf spring", positive)
     tyre_stiffness: Number = parameter("N/m", "vertical tyre stiffness of an axle", positive, adjustable=False)
-    damper: AbstractDamper
+    damper: AbstractDamper | None = None
     tyre_damping: Number = parameter(
         "N s/m", "vertical tyre damping of an axle", nonnegative, default=0.0, adjustable=False
     )

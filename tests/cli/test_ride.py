@@ -1,6 +1,7 @@
 """`jaxdamp ride`: metrics beside a baseline, pictures, refusals that leave nothing behind."""
 
 import csv
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -167,14 +168,26 @@ def test_every_preset_with_a_damper_takes_the_law() -> None:
 
 
 def test_a_law_as_baseline_stands_where_it_stands_as_start(law: Path, tmp_path: Path) -> None:
-    """Of the truck in front: its tandem has the friction of its leaves."""
+    """By the name of a vehicle and by its file; of a truck in front, since leaves of a tandem are no damper."""
     own, start = parse_vehicle("truck_001")(None), parse_vehicle("truck_001")(read_law("start", law))
-    assert equal(read_baseline(law, own, "truck_001"), start) and not equal(own, start)
+    assert equal(read_baseline(law, own), start) and not equal(own, start)
+    to_json(own, tmp_path / "truck.json")
+    assert equal(parse_vehicle(str(tmp_path / "truck.json"))(read_law("start", law)), start)
     file = tmp_path / "car.toml"
     file.write_text('preset = "quarter_car_000"\n[parameters]\ndamper.rebound_rate = 900.0\n')
     car = parse_vehicle(str(file))(Bilinear(1000.0, 1000.0))
     assert equal(car.damper, Bilinear(900.0, 1000.0))  # type: ignore[attr-defined]
-    assert equal(read_baseline(law, car, str(file)).damper, read_law("start", law))  # type: ignore[attr-defined]
+    assert equal(read_baseline(law, car).damper, read_law("start", law))  # type: ignore[attr-defined]
+
+
+def test_a_law_for_the_dampers_is_not_put_under_seats_and_cabs(law: Path, tmp_path: Path) -> None:
+    seat = vehicles.Seat((vehicles.SeatMass(80.0, 6e3, Linear(600.0)),))
+    mounts = vehicles.Cab(800.0, 700.0, 1.0, 0.8, 0.8, 60e3, 60e3, Linear(4e3), Linear(5e3))
+    truck = dataclasses.replace(vehicles.presets.truck_001(), cab=mounts, seats=(seat,))
+    to_json(truck, tmp_path / "truck.json")
+    loaded = parse_vehicle(str(tmp_path / "truck.json"))(read_law("start", law))
+    assert equal(loaded.front.damper, read_law("start", law))  # type: ignore[attr-defined]
+    assert equal((loaded.cab, loaded.seats), (mounts, (seat,)))  # type: ignore[attr-defined]
 
 
 def test_how_long_a_road_is_driven() -> None:

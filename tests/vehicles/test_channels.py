@@ -23,7 +23,7 @@ def test_every_channel_has_a_unit_and_a_description(name):
 def test_descriptions_say_of_how_many_a_channel_is():
     said = presets.truck_001().descriptions
     assert said["front_damper_force"].startswith("force of front_damper, of one of 2 equal ones")
-    assert said["tandem_damper_force"].startswith("force of tandem_damper, both sides together")
+    assert said["tandem_friction_force"].startswith("force of tandem_friction, both sides together")
     assert "both sides together" in said["tandem_1_dynamic_tyre_load"]
     hull = presets.m113_003().descriptions
     assert "one of 2" in hull["wheel_1_damper_force"] and "both sides" in hull["wheel_3_dynamic_tyre_load"]

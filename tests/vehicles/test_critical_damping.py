@@ -38,7 +38,7 @@ def test_each_wheel_carries_its_share():
     assert set(critical_damping(full_car_jazar())) == {
         f"{end}_{side}_damper" for end in ("front", "rear") for side in ("left", "right")
     }
-    assert set(critical_damping(truck_001())) == {"front_damper", "tandem_damper"}
+    assert set(critical_damping(truck_001())) == {"front_damper", "tandem_friction"}
     hull, seat = m113_003(), Seat((SeatMass(80.0, 30e3, LAW),), ahead=0.5)
     for seats in ((), (seat,)):  # its wheels have no mass, and it is none itself
         assert critical_damping(dataclasses.replace(hull, seats=seats)) == {}

@@ -34,11 +34,12 @@ def test_four_quarter_cars():
 
     Four masses could also move crosswise, which a rigid body cannot: linear dampers and a road without warp.
     """
-    corner = Corner(40.0, 22e3, 180e3, dampers.Bilinear(1500.0, 1500.0))
+    law = dampers.Bilinear(1500.0, 1500.0)
+    corner = Corner(40.0, 22e3, 180e3, law)
     car = full(corner, corner, 0.0, MASS * AHEAD * BEHIND)
     heights = np.stack([*HEIGHTS[:, :3].T, HEIGHTS[:, 1] + HEIGHTS[:, 2] - HEIGHTS[:, 0]], axis=1)
     response = simulate(car, tracks(heights))
-    alone = QuarterCar(MASS / 4, 40.0, 22e3, 180e3, corner.damper)
+    alone = QuarterCar(MASS / 4, 40.0, 22e3, 180e3, law)
     for i, name in enumerate(car.wheel_names):
         compare(response, name, simulate(alone, tracks(heights[:, i : i + 1])))
 
