@@ -133,6 +133,17 @@ def positive(argument: str, value: object, remedy: str = "") -> None:
         refuse(argument, "be positive and finite", summary(array, ~(np.isfinite(array) & (array > 0))), remedy)
 
 
+COLDEST = 150.0  # K, below which no damper works: such a number is in degrees Celsius
+
+
+def kelvin(argument: str, value: object) -> None:
+    """Refuse temperatures that cannot be in kelvin."""
+    array = _numbers(argument, value)
+    if array is not None and not (np.all(np.isfinite(array)) and np.all(array > COLDEST)):
+        wrong = summary(array, ~(np.isfinite(array) & (array > COLDEST)))
+        refuse(argument, f"be in kelvin, above {COLDEST:g}", wrong, "Of a temperature in °C, write it plus 273.15.")
+
+
 def untraced(
     argument: str, tree: object, remedy: str = "Call it outside `jax.jit`, `jax.grad` and `jax.vmap`."
 ) -> None:

@@ -13,6 +13,8 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes) -> Path:
     target = Path(path).expanduser()
     if not target.parent.is_dir():
         _checks.refuse("path", "lie in a folder that exists", target, "Make the folder first.")
+    if target.is_dir():
+        _checks.refuse("path", "be a file", f"the folder {str(target)!r}", "Add the name of the file.")
     with whole(target) as draft:
         draft.write_bytes(content.encode() if isinstance(content, str) else content)
     return target

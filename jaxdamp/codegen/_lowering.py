@@ -96,6 +96,9 @@ def lower(function: Callable[..., PyTree], *arguments: PyTree, finite: bool = Fa
     return Program(pruned(writer.statements, needed), jax.tree.unflatten(structure[-1], results))
 
 
+_COMPLEX = "Complex numbers cannot be printed. Write real and imaginary parts as real numbers."
+
+
 def _atoms(leaf: Symbols) -> Atoms:
     def atom(index: tuple[int, ...]) -> Atom:
         name: object = leaf.names[index]
@@ -107,6 +110,8 @@ def _atoms(leaf: Symbols) -> Atoms:
 def evaluated(writer: Writer, inner: Inner, operands: list[Atoms]) -> list[Atoms]:
     """The results of a jaxpr on arrays of atoms; what they take is written."""
     jaxpr, values = opened(inner)
+    if any(np.iscomplexobj(value) for value in values):
+        raise NotImplementedError(_COMPLEX)
     atoms_of: dict[Var, Atoms] = dict(zip(jaxpr.constvars, map(_arrays.constants, values), strict=True))
     atoms_of |= zip(jaxpr.invars, operands, strict=True)
 
@@ -114,6 +119,8 @@ def evaluated(writer: Writer, inner: Inner, operands: list[Atoms]) -> list[Atoms
         return _arrays.constants(literal(operand)) if isinstance(operand, Literal) else atoms_of[operand]
 
     for equation, reads, writes in equations(jaxpr):
+        if any(dtype.startswith("complex") for dtype in equation.dtypes):
+            raise NotImplementedError(_COMPLEX)
         atoms = [read(operand) for operand in reads]
         atoms_of |= zip(writes, _rule(equation.name)(writer, equation, atoms), strict=True)
     return [read(operand) for operand in jaxpr.outvars]

@@ -105,11 +105,11 @@ class AbstractSeries(AbstractWrapper):
         def law_force(y: Scalar) -> Scalar:
             return law.force(y, jnp.zeros_like(y), law.state_at_rest(y))
 
-        locked = jnp.abs(law_force(jnp.asarray(x)))
+        locked, everywhere = law_force(jnp.asarray(x)), not law.traits().stroke_dependent_at_rest
         zero = jnp.zeros_like(locked)
-        reach = self.largest_deflection(locked, self.shared_at_rest(zero))
+        reach = self.largest_deflection(jnp.abs(locked), self.shared_at_rest(zero))
         total = increasing_root(
-            lambda total: self.force_at_rest(total) - law_force(x - total),
+            lambda total: self.force_at_rest(total) - (locked if everywhere else law_force(x - total)),
             zero,
             -reach,
             reach,

@@ -4,6 +4,7 @@ from typing import final
 
 import jax.numpy as jnp
 
+from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.contract import Traits
@@ -79,6 +80,9 @@ class Heated(AbstractWrapper):
     reference_temperature: Number = setting(
         "K", "T₀, temperature of the law's own parameters", positive, default=293.15
     )
+
+    def __check_init__(self) -> None:
+        _checks.kelvin("Heated.reference_temperature", self.reference_temperature)
 
     def own_state_count(self) -> int:
         """The rise of the temperature [K]."""

@@ -69,6 +69,8 @@ class TemperatureScaled(AbstractWrapper):
         return [(self.law, motion.divided(self.factor()).at_temperature(self.temperature))]
 
     def __check_init__(self) -> None:
+        for name in ("temperature", "reference_temperature"):
+            _checks.kelvin(f"{type(self).__name__}.{name}", getattr(self, name))
         factor = _checks.concrete(self.factor())
         if factor is not None and not factor > 0:
             must = "give a positive factor 1 − κ (T − T₀) on the force"

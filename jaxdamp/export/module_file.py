@@ -93,6 +93,8 @@ def from_json(path_or_text: str | os.PathLike[str]) -> PyTree:
         source, text = "the text", path_or_text
     else:
         file = Path(path_or_text).expanduser()
+        if file.is_dir():
+            _checks.refuse("path_or_text", "be a file", f"the folder {str(file)!r}", "Add the name of the file.")
         if not file.is_file():
             raise FileNotFoundError(f"There is no file {str(file)!r} (text would have to begin with '{{').")
         source, text = str(file), read_text(file, "JSON")

@@ -14,8 +14,8 @@ from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import VectorLike
 from jaxdamp._warned import warn
 from jaxdamp._writing import write_whole
-from jaxdamp.dampers import AbstractDamper, command_words, extrapolated, without_fitted_ranges
-from jaxdamp.rig import quasi_static, respond
+from jaxdamp.dampers import AbstractDamper, Heated, command_words, extrapolated, laws_inside, without_fitted_ranges
+from jaxdamp.rig import as_warm_as_it_begins, dynamic_stiffness, quasi_static
 
 
 @of_known_numbers
@@ -71,7 +71,7 @@ def settled_table(law: AbstractDamper, velocities: VectorLike, call: str, *, tur
     if velocity.ndim != 1 or velocity.size == 0 or np.any(np.diff(velocity) <= 0):
         _checks.refuse("velocities", "be one or more, strictly increasing", velocity, "Try `numpy.unique`.")
     curve = quasi_static(law, velocity)
-    if not curve.settled.any():
+    if not set(np.sign(velocity)) - {0.0} <= set(np.sign(velocity[curve.settled])):  # a whole side is missing
         remedy = "A table cannot represent such a law: use `respond` with the intended motion."
         what = f"{type(law).__name__}. {curve.note.removesuffix('.')}"
         _checks.refuse("law", "have a force at constant velocity", what, remedy)
@@ -85,6 +85,11 @@ def settled_table(law: AbstractDamper, velocities: VectorLike, call: str, *, tur
         comments.append(
             f"quasi-static: force at constant velocity; the hysteresis of the law's {states} state(s) is not in here"
         )
+    comments += [
+        f"as warm as it begins: {float(part.initial_rise):g} K above its reference temperature"
+        for _, part in laws_inside(law)
+        if isinstance(part, Heated)
+    ]
     if curve.note:
         comments.append(f"rows left out{', with rebound counted positive' * turned}: {curve.note}")
     settled = velocity[curve.settled]
@@ -122,7 +127,7 @@ def _range_lines(law: AbstractDamper, velocity: np.ndarray, *, turned: bool) -> 
 
 
 _FREQUENCIES = (1.5, 12.0)  # Hz, near the natural frequencies of body and wheel
-_CYCLES, _SAMPLES = 3, 200  # cycles of a sine, samples of each
+_SAMPLES = 200  # of a sine
 
 
 @of_known_numbers
@@ -300,21 +305,19 @@ def _left_out(law: AbstractDamper, table: SettledTable) -> list[str]:
     peak = 0.5 * float(min(-table.velocity[0], table.velocity[-1]))
     if peak <= 0:
         return ["what the table leaves out is not computed, since it holds one direction only"]
-    law = without_fitted_ranges(law)
+    law = as_warm_as_it_begins(without_fitted_ranges(law))
     reach = min([np.inf, *(abs(float(limit)) for term in law.side_by_side() for limit in term.stroke_limits)])
     shares = []
     for frequency in _FREQUENCIES:
-        turn = 2.0 * np.pi * np.arange(_CYCLES * _SAMPLES + 1) / _SAMPLES
-        speed = min(peak, 0.9 * reach * 2.0 * np.pi * frequency)
-        stroke, velocity = speed / (2.0 * np.pi * frequency) * np.sin(turn), speed * np.cos(turn)
-        try:
-            time = turn / (2.0 * np.pi * frequency)
-            force = np.asarray(respond(law, time, stroke, velocity, state=law.initial_state()))[-_SAMPLES:]
-        except ValueError as error:
-            return [f"what the table leaves out is not known in a sine of {frequency:g} Hz, {speed:.3g} m/s: {error}"]
-        lost = force - np.interp(velocity[-_SAMPLES:], table.velocity, table.force)
-        share = 100.0 * np.sqrt(np.mean(lost**2) / np.mean(force**2))
-        shares.append(f"{share:.1f} % at {frequency:g} Hz and {speed:.3g} m/s")
+        rate = 2.0 * np.pi * frequency
+        speed = min(peak, 0.9 * reach * rate)
+        force = np.asarray(dynamic_stiffness(law, [frequency], speed / rate, samples=_SAMPLES).force)[0]
+        where = f"at {frequency:g} Hz and {speed:.3g} m/s"
+        if not np.all(np.isfinite(force)):
+            return [f"what the table leaves out is not known {where}, where the law has no steady force"]
+        velocity = speed * np.cos(2.0 * np.pi * np.arange(_SAMPLES) / _SAMPLES)
+        lost = force - np.interp(velocity, table.velocity, table.force)
+        shares.append(f"{100.0 * np.sqrt(np.mean(lost**2) / np.mean(force**2)):.1f} % {where}")
     return [f"left out by the table, as a share of the RMS force in a settled sine: {', '.join(shares)}"]
 
 

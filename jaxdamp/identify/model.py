@@ -285,19 +285,22 @@ def state_history(
         state = law.advance(x0, v0, x1, v1, state, dt)
         return state, state
 
-    begin = law.initial_state()
+    begin = law.state_at_rest(stroke[0])
     ends = (stroke[:-1], velocity[:-1], stroke[1:], velocity[1:])
     return jnp.concatenate([begin[None], jax.lax.scan(step, begin, ends)[1]])
 
 
-def initial_state(model: Model, effects: tuple[str, ...], cycle: Cycle, followed: Followed) -> tuple[State, Scalar]:
-    """The states at the start of a record: periodic, or at rest; and how much they still change over the cycle."""
+def initial_state(
+    model: Model, effects: tuple[str, ...], first: Scalar, cycle: Cycle, followed: Followed
+) -> tuple[State, Scalar]:
+    """The states at the first stroke of a record: periodic, or at rest; and their change over the cycle."""
     rig = rig_of(model)
     if rig is not None:
         before = [jnp.concatenate([channel[:-1], channel]) for channel in (cycle.stroke, cycle.velocity)]
         stroke, velocity = rig.delayed_motion(effects, cycle.dt, *before)
         again = -cycle.stroke.size
+        first = first - rig.stroke_offset
         cycle = cycle._replace(stroke=stroke[again:] - rig.stroke_offset, velocity=velocity[again:])
     law = followed.first(law_of(model))
     state, change = periodic_state(law, cycle)
-    return jnp.where(cycle.periodic, state, law.initial_state()), jnp.where(cycle.periodic, change, 0.0)
+    return jnp.where(cycle.periodic, state, law.state_at_rest(first)), jnp.where(cycle.periodic, change, 0.0)

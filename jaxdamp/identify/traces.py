@@ -73,7 +73,7 @@ class Batch(AbstractWeighted):
         ) -> tuple[Array, Array]:
             own, change = with_values(model, values), jnp.zeros(())
             if cycle is not None:
-                state, change = initial_state(own, self.effects, cycle, followed)
+                state, change = initial_state(own, self.effects, x[0], cycle, followed)
             return marched(own, self.effects, dt, x, v, followed, self.substeps, state), change
 
         starts = [start.initial_state for start in starts_in(model) if start is not None]

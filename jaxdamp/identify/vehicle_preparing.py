@@ -145,7 +145,7 @@ def checked_benches(
     for path in bench:
         try:
             law = get(vehicle, path)
-        except (AttributeError, IndexError, ValueError, KeyError, TypeError):
+        except (AttributeError, LookupError):
             law = None
         remedy = "Write the path of a damper law, such as 'damper' or 'front.damper'."
         _checks.instance("bench", law, AbstractDamper, f"name laws of the vehicle, which {path!r} is not", remedy)

@@ -86,12 +86,20 @@ def get(tree: object, path: str) -> PyTree:
     Arguments:
         tree: a law, a vehicle, or containers of them.
         path: names and indices joined by dots.
+
+    Raises:
+        LookupError: there is nothing at this path.
     """
+    whole = tree
     for part in path.split(".") if path else []:
-        if isinstance(tree, tuple | list):
-            tree = tree[int(part)]
-        else:
-            tree = tree[part] if isinstance(tree, dict) else getattr(tree, part)
+        try:
+            if isinstance(tree, tuple | list):
+                tree = tree[int(part)]
+            else:
+                tree = tree[part] if isinstance(tree, dict) else getattr(tree, part)
+        except (AttributeError, LookupError, ValueError):
+            known = [p.path for p in parameters(whole)]
+            raise LookupError(f"Nothing is at the path {path!r}: {_nearest(known, path)}") from None
     return tree
 
 

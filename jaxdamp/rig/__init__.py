@@ -1,6 +1,10 @@
 """The test machine: the force of a law under a prescribed stroke, and what the machine adds to it."""
 
-from jaxdamp.rig.constant_velocity import QuasiStatic as QuasiStatic, quasi_static
+from jaxdamp.rig.constant_velocity import (
+    QuasiStatic as QuasiStatic,
+    as_warm_as_it_begins as as_warm_as_it_begins,
+    quasi_static,
+)
 from jaxdamp.rig.dynamic_stiffness import DynamicStiffness as DynamicStiffness, dynamic_stiffness
 from jaxdamp.rig.law_numbers import LawNumbers as LawNumbers, is_number as is_number
 from jaxdamp.rig.machine import Readings as Readings, Rig, gas_and_friction as gas_and_friction

@@ -2,21 +2,22 @@
 
 import functools
 from collections.abc import Hashable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int, PyTree
+from jaxtyping import Array, Bool, Float, Int
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._traced import of_known_numbers
-from jaxdamp.dampers import AbstractDamper, coverage
-from jaxdamp.parameters import as_float
+from jaxdamp.dampers import AbstractDamper, Heated, coverage, laws_inside
+from jaxdamp.parameters import as_float, with_values
 from jaxdamp.rig.law_numbers import is_number, numbers_of
 from jaxdamp.rig.printed import numbers_on_rig, printed_law
+from jaxdamp.rig.strokes import refuse_strokes
 
 
 class QuasiStatic(NamedTuple):
@@ -27,7 +28,8 @@ class QuasiStatic(NamedTuple):
         force: settled force [N], NaN where the law does not settle or has no finite force, shape (points,).
         settled: which points have a force, shape (points,).
         note: how many points have none, where and why, in words; empty if all have one.
-        states: states of the law at the end, shape (points, states): a start for `respond` of a record in motion.
+        states: states of the law at the end, NaN where it does not settle, shape (points, states): a start for
+            `respond` of a record in motion.
     """
 
     velocity: Float[Array, " points"]
@@ -39,28 +41,33 @@ class QuasiStatic(NamedTuple):
 
 MOST_REMEMBERED = 64  # curves
 LONGEST_HOLD = 64  # s at constant velocity
+LONG = 1e30  # s, in which a law does not cool
 STEADY = 1e-4  # change of a force while the time held doubles, relative to the scale of the forces: settled
 STILL = {"float64": 1e-9, "float32": 1e-3}  # the same, at which no longer hold can improve the curve
 
 
 @of_known_numbers
-def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.ndarray) -> QuasiStatic:
+def quasi_static(
+    law: AbstractDamper, velocities: Float[Array, " points"] | np.ndarray, *, stroke: float = 0.0
+) -> QuasiStatic:
     """Force [N] of a law at constant velocity, its states settled: the curve without hysteresis.
 
-    Each velocity is held at stroke zero for 1, 2, 4 ... up to 64 s, until no force changes any more; a memoryless law
+    Each velocity is held at one stroke for 1, 2, 4 ... up to 64 s, until no force changes any more; a memoryless law
     answers at once. A point is settled if its force changed, over the last doubling of the time, by no more than 1e-4
-    of itself or of the largest settled force. Friction that acts through a bristle needs longer the slower it moves,
-    and a law that heats up or drifts never settles: such points are left without a force, and the note says so.
+    of itself or of the largest settled force. A `Heated` law keeps its `initial_rise`. Friction that acts through a
+    bristle needs longer the slower it moves, and a law that drifts never settles: such points are left without a force,
+    and the note says so.
 
     Arguments:
         law: the damper law.
         velocities: velocities [m/s], shape (points,).
+        stroke: at which they are held [m].
 
     Returns:
         The forces, NaN at points without one, with a flag for each point and a note in words.
 
     Raises:
-        ValueError: velocities that are not finite numbers in one dimension.
+        ValueError: velocities that are not finite numbers in one dimension; a stroke outside the limits of the law.
 
     >>> from jaxdamp.dampers import Linear, SeriesSpring
     >>> quasi_static(SeriesSpring(Linear(2000.0), stiffness=1e6), np.array([-0.5, 0.0, 0.5])).force
@@ -71,16 +78,30 @@ def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.n
     if velocities.ndim != 1 or velocities.size == 0:
         _checks.refuse("velocities", "be one or more in one dimension", f"of shape {velocities.shape}")
     _checks.finite("velocities", velocities)
+    stroke = _checks.plain_number("stroke", stroke)
+    refuse_strokes(law, "stroke", stroke, stroke)
+    law = as_warm_as_it_begins(law)
     numbers = numbers_of(law)
     kinds = sorted({str(leaf.dtype) for leaf in jax.tree.leaves(law) if is_number(leaf)})
-    key = numbers.key, numbers.flat.tobytes(), np.asarray(velocities).tobytes(), *kinds, coverage(law)
-    return _settled(_Keyed(key, law, velocities))
+    key = numbers.key, numbers.flat.tobytes(), np.asarray(velocities).tobytes(), stroke, *kinds, coverage(law)
+    return _settled(_Keyed(key, law, velocities, stroke))
+
+
+def as_warm_as_it_begins(law: AbstractDamper) -> AbstractDamper:
+    """The law whose `Heated` parts keep the rise that they begin with, since at a constant power they never settle.
+
+    Arguments:
+        law: the damper law.
+    """
+    heated = [prefix for prefix, part in laws_inside(law) if isinstance(part, Heated)]
+    still = {"heat_capacity": np.asarray(np.inf), "cooling_time": np.asarray(LONG)}
+    return with_values(law, {f"{prefix}{name}": value for prefix in heated for name, value in still.items()})
 
 
 class _Keyed:
     """What is remembered by a key, and with what it is computed."""
 
-    content: tuple[PyTree, ...]
+    content: tuple[Any, ...]
 
     def __init__(self, key: Hashable, *content: object) -> None:
         self.key, self.content = key, content
@@ -95,10 +116,10 @@ class _Keyed:
 @functools.lru_cache(maxsize=MOST_REMEMBERED)
 def _settled(question: _Keyed) -> QuasiStatic:
     """The curve, which a table, a picture and a page ask for one after the other."""
-    law, velocities = question.content
-    begin = np.asarray(law.initial_state())
+    law, velocities, stroke = question.content
+    begin = np.asarray(law.state_at_rest(jnp.asarray(stroke, velocities.dtype)))
     states = on_device(np.broadcast_to(begin, (velocities.size, begin.size)).copy())
-    states, force = _hold(law, velocities, states, jnp.asarray(0))
+    states, force = _hold(law, stroke, velocities, states, jnp.asarray(0))
     if begin.size == 0:
         settled = np.isfinite(force)
         note = _gaps(law, np.asarray(velocities), np.asarray(force), settled)
@@ -106,7 +127,7 @@ def _settled(question: _Keyed) -> QuasiStatic:
     seconds, change = 0, np.full(velocities.shape, np.inf)
     while seconds < LONGEST_HOLD:
         longer = max(2 * seconds, 1)
-        before, (states, force) = force, _hold(law, velocities, states, jnp.asarray(1000 * (longer - seconds)))
+        before, (states, force) = force, _hold(law, stroke, velocities, states, jnp.asarray(1000 * (longer - seconds)))
         seconds, change = longer, np.abs(np.asarray(force) - np.asarray(before))
         if np.all(change <= STILL[str(force.dtype)] * np.max(np.abs(force))):
             break
@@ -115,6 +136,7 @@ def _settled(question: _Keyed) -> QuasiStatic:
     alone = change <= limit * size
     settled = np.isfinite(size) & (alone | (change <= limit * np.max(size, where=alone, initial=0.0)))
     note = _gaps(law, np.asarray(velocities), np.asarray(force), settled)
+    states = on_device(np.where(settled[:, None], states, np.nan))
     return QuasiStatic(velocities, on_device(np.where(settled, force, np.nan)), settled, note, states)
 
 
@@ -134,16 +156,16 @@ def _gaps(law: AbstractDamper, velocity: np.ndarray, force: np.ndarray, settled:
     return " ".join(notes)
 
 
-def _hold(law: AbstractDamper, velocities: Array, states: Array, count: Array) -> tuple[Array, Array]:
+def _hold(law: AbstractDamper, stroke: float, velocities: Array, states: Array, count: Array) -> tuple[Array, Array]:
     """States and forces after so many more milliseconds at constant velocities."""
     if states.size:
         numbers = numbers_on_rig(law)
         printed = printed_law(numbers, None)
         if printed is not None:
             s = np.array(states, np.float64)
-            force = printed.hold(numbers.flat, np.ascontiguousarray(velocities, np.float64), int(count), s)
+            force = printed.hold(numbers.flat, stroke, np.ascontiguousarray(velocities, np.float64), int(count), s)
             return on_device(s.astype(states.dtype)), on_device(force.astype(velocities.dtype))
-    return _held_by_xla(law, velocities, states, count)
+    return _held_by_xla(law, on_device(np.asarray(stroke, velocities.dtype)), velocities, states, count)
 
 
 def on_device(array: np.ndarray) -> Array:
@@ -152,12 +174,14 @@ def on_device(array: np.ndarray) -> Array:
 
 
 @compiled_for_loops
-def _held_by_xla(law: AbstractDamper, velocities: Array, states: Array, count: Int[Array, ""]) -> tuple[Array, Array]:
+def _held_by_xla(
+    law: AbstractDamper, x: Array, velocities: Array, states: Array, count: Int[Array, ""]
+) -> tuple[Array, Array]:
     """States and forces after so many more milliseconds at constant velocities."""
-    zero, dt = jnp.zeros((), velocities.dtype), jnp.asarray(1e-3, velocities.dtype)
+    dt = jnp.asarray(1e-3, velocities.dtype)
 
     def one(v: Array, start: Array) -> tuple[Array, Array]:
-        state = jax.lax.fori_loop(0, count, lambda _, state: law.advance(zero, v, zero, v, state, dt), start)
-        return state, law.force(zero, v, state)
+        state = jax.lax.fori_loop(0, count, lambda _, state: law.advance(x, v, x, v, state, dt), start)
+        return state, law.force(x, v, state)
 
     return jax.vmap(one)(velocities, states)

@@ -20,6 +20,7 @@ from jaxdamp._tables import Column, Table, plain
 from jaxdamp._traced import behind
 from jaxdamp._types import Scalar, ScalarLike, Signal, State
 from jaxdamp.dampers import AbstractDamper
+from jaxdamp.rig.strokes import refuse_strokes
 
 
 SAMPLES = 256  # of a period
@@ -173,7 +174,8 @@ def dynamic_stiffness(
         Forces over a cycle, complex stiffness, damping, and a status for every point.
 
     Raises:
-        ValueError: frequencies or amplitudes that are not positive or do not fit together, or too low a frequency.
+        ValueError: frequencies or amplitudes that are not positive or do not fit together, or too low a frequency;
+            a stroke outside the limits of the law.
 
     Valid for forces that repeat with the stroke; a law that goes on heating up or drifting is not steady, as its status
     says. Only the first harmonic counts: of friction F_c alone, K″ = 4 F_c/(πX) and K′ = 0.
@@ -190,6 +192,7 @@ def dynamic_stiffness(
     points, sizes = checked_points(frequency, amplitude)
     count = _substeps(law, points, samples, substeps)
     middle = jnp.asarray(mean, dtype=float)
+    refuse_strokes(law, "amplitude", middle - sizes, middle + sizes)
     force, shots = _forces(law, points, sizes, middle, samples, count)
     force = jnp.where(is_steady(shots.change)[..., None] & jnp.isfinite(force), force, jnp.nan)
     return DynamicStiffness(

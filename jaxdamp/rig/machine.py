@@ -162,15 +162,17 @@ class Rig(AbstractDeclared):
             for name, values in (("temperature", temperature), ("command", command))
         )
         motion = self.delayed_motion(self.effects(), dt, stroke, rate)
-        acting = Followed(temperature, self.acting(self.effects(), dt, command))
+        acting = self.acting(self.effects(), dt, Followed(temperature, command))
         parts = substeps if "lag" in self.effects() else 1
         if parts > 1:
             dt, motion, acting = finer(dt, *motion, acting, parts)
             time, substeps = time[0] + dt * jnp.arange(motion[0].size, dtype=time.dtype), 1
-        warm, acting = acting.temperature, acting.of(law)
-        start, inside = acting.first(law).initial_state(), motion[0] - self.stroke_offset
+        warm, acting = acting.temperature, acting.of(law)  # for the machine and for the law
+        inside = motion[0] - self.stroke_offset
+        start = acting.first(law).state_at_rest(inside[0])
         law_force = respond(law, time, inside, motion[1], state=start, **acting._asdict(), substeps=substeps)
-        return _readings(self, self.effects(), law_force, dt, *motion, warm).every(parts)
+        shown = _readings(self, self.effects(), law_force, dt, *motion, warm).every(parts)
+        return shown if temperature is None else shown._replace(temperature=temperature)
 
     def march(
         self,
@@ -185,20 +187,25 @@ class Rig(AbstractDeclared):
     ) -> Readings:
         """`readings` without its checks, for use inside compiled functions, with the `effects` known outside."""
         motion = self.delayed_motion(effects, dt, stroke, velocity)
-        acting = followed._replace(command=self.acting(effects, dt, followed.command))
+        acting = self.acting(effects, dt, followed)
         parts = substeps if "lag" in effects else 1
         if parts > 1:
             (dt, motion, acting), substeps = finer(dt, *motion, acting, parts), 1
         force = march(law, dt, motion[0] - self.stroke_offset, motion[1], substeps, acting, state)
         return _readings(self, effects, force, dt, *motion, acting.temperature).every(parts)
 
-    def acting(self, effects: tuple[str, ...], dt: Scalar, command: Signal | None) -> Signal | None:
-        """The command that the law has, behind the actuator's lag, at the instants whose force the channel shows."""
+    def acting(self, effects: tuple[str, ...], dt: Scalar, followed: Followed) -> Followed:
+        """Temperature and command, this behind the actuator's lag, at the instants whose force the channel shows."""
+        temperature, command = followed
         if command is not None and "command_lag" in effects:
             command = lagged(command, self.command_lag / dt)
-        if command is not None and "delay" in effects:
-            command = delayed_straight(command, self.force_delay / dt)
-        return command
+        if "delay" not in effects:
+            return Followed(temperature, command)
+        samples = self.force_delay / dt
+        return Followed(
+            None if temperature is None else delayed(temperature, samples),
+            None if command is None else delayed_straight(command, samples),
+        )
 
     def delayed_motion(
         self, effects: tuple[str, ...], dt: Scalar, stroke: Signal, velocity: Signal
@@ -259,7 +266,6 @@ def _readings(
     samples = rig.force_delay / dt
     if temperature is not None:
         rise = temperature - rig.reference_temperature
-        rise = delayed(rise, samples) if "delay" in effects else rise
     elif "heat" in effects:
         rise = _temperature_rise(rig, dt, law_force * velocity, friction * velocity)
     else:

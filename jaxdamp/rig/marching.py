@@ -77,7 +77,7 @@ def solve_law(
     """
     from jaxdamp._driven import check_solver, driven_states, verdict
 
-    start = law.initial_state()
+    start = law.state_at_rest(stroke[0])
     if not start.size:
         return jax.vmap(lambda x, v: law.force(x, v, start))(stroke, velocity)
     check_solver(solver, rtol, atol)
@@ -107,7 +107,7 @@ def march(
         velocity: [m/s], shape (time,).
         substeps: steps from one instant to the next.
         followed: measured channels that the law follows; a step takes the mean of both ends.
-        state: of the law at the first instant; its own initial state if left out.
+        state: of the law at the first instant; that at rest at the first stroke if left out.
     """
     return march_states(law, dt, stroke, velocity, substeps, followed, state)[0]
 
@@ -128,7 +128,7 @@ def march_states(
     def force(x: Array, v: Array, state: Array, warm: Array | None, command: Array | None) -> Array:
         return law_at(law, warm, command).force(x, v, state)
 
-    state = followed.first(law).initial_state() if state is None else state
+    state = followed.first(law).state_at_rest(stroke[0]) if state is None else state
     if state.size == 0:
         return jax.vmap(force, (0, 0, None, 0, 0))(stroke, velocity, state, warm, commands), state
     h, (fine_x, fine_v), _ = finer(dt, stroke, velocity, NOTHING, substeps)

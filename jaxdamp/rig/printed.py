@@ -41,7 +41,7 @@ void record(const double *p, int64_t count, int64_t parts, const double *x, cons
     double ds[STATES + 1][LANES] __attribute__((aligned(64)));
     const int slopes = weight != 0;
     begin_prepare(p); force_prepare(p); advance_prepare(p);
-    begin(p, s, ds, slopes);
+    begin(p, x[0], dx ? dx[0] : 0.0, s, ds, slopes);
     for (int64_t t = 0; t < count; t++) {
         if (!slopes) {
             force(p, x[t], v[t], 0.0, 0.0, s, (const double (*)[LANES])ds, &F, dF, 0);
@@ -60,7 +60,7 @@ void record(const double *p, int64_t count, int64_t parts, const double *x, cons
 }
 """
 _HOLD = """
-void hold(const double *p, int64_t points, const double *v, int64_t count, double *states, double *forces)
+void hold(const double *p, double x, int64_t points, const double *v, int64_t count, double *states, double *forces)
 {
     double ds[STATES + 1][LANES], dF[LANES], before[STATES + 1];
     force_prepare(p); advance_prepare(p);
@@ -69,10 +69,10 @@ void hold(const double *p, int64_t points, const double *v, int64_t count, doubl
         for (int64_t step = 0, moves = 1; moves && step < count; step++) {
             moves = 0;
             memcpy(before, s, STATES * sizeof *s);
-            advance(p, 0.0, v[i], 0.0, v[i], 1e-3, 0.0, 0.0, 0.0, 0.0, s, ds, 0);
+            advance(p, x, v[i], x, v[i], 1e-3, 0.0, 0.0, 0.0, 0.0, s, ds, 0);
             for (int m = 0; m < STATES; m++) moves |= !(fabs(s[m] - before[m]) <= 4e-16 * fabs(s[m]));
         }
-        force(p, 0.0, v[i], 0.0, 0.0, s, (const double (*)[LANES])ds, forces + i, dF, 0);
+        force(p, x, v[i], 0.0, 0.0, s, (const double (*)[LANES])ds, forces + i, dF, 0);
     }
 }
 """
@@ -80,7 +80,7 @@ _CONDITIONS = """
 void conditions(const double *p, double *m, double (*dm)[LANES]) { margins_prepare(p); margins(p, m, dm, 1); }
 """
 _ARGUMENTS = {
-    "begin": "double *restrict s, double (*restrict ds)[LANES], int slopes",
+    "begin": "double x, double dx, double *restrict s, double (*restrict ds)[LANES], int slopes",
     "force": "double x, double v, double dx, double dv, const double *restrict s, "
     "const double (*restrict ds)[LANES], double *restrict F, double *restrict dF, int slopes",
     "advance": "double x0, double v0, double x1, double v1, double h, double dx0, double dv0, double dx1, double dv1, "
@@ -138,9 +138,13 @@ def _functions(numbers: LawNumbers, states: int, conditions: int) -> dict[str, _
     def each(name: str, count: int) -> tuple[list[str], list[str]]:
         return [f"{name}[{i}]" for i in range(count)], [f"d{name}[{i}][k]" for i in range(count)]
 
+    def begin(arrays: list[Array], s: Array, x: Array) -> Array:
+        law, rig = numbers.built(arrays)
+        return law.state_at_rest(x - rig.stroke_offset)
+
     of_conditions = _Printed(lambda arrays, s: margins(numbers.built(arrays).law), each("m", conditions))
     return {
-        "begin": _Printed(lambda arrays, s: numbers.built(arrays).law.initial_state(), each("s", states)),
+        "begin": _Printed(begin, each("s", states), 0, ("x",)),
         "force": _Printed(force, (["*F"], ["dF[k]"]), states, ("x", "v")),
         "advance": _Printed(advance, each("s", states), states, ("x0", "v0", "x1", "v1", "h")),
     } | ({"margins": of_conditions} if conditions else {})
@@ -185,7 +189,7 @@ class PrintedLaw:
         self._record, self._hold = compiled.record, compiled.hold
         self._conditions = getattr(compiled, "conditions", None)
         self._record.argtypes = [pointer, whole, whole, *[pointer] * 8, ctypes.c_double, *[pointer] * 3, whole, pointer]
-        self._hold.argtypes = [pointer, whole, pointer, whole, pointer, pointer]
+        self._hold.argtypes = [pointer, ctypes.c_double, whole, pointer, whole, pointer, pointer]
         self._record.restype = self._hold.restype = None
 
     def __getstate__(self) -> dict[str, object]:
@@ -203,18 +207,24 @@ class PrintedLaw:
         return out
 
     def hold(
-        self, p: Float[np.ndarray, " numbers"], v: Float[np.ndarray, " points"], count: int, states: np.ndarray
+        self,
+        p: Float[np.ndarray, " numbers"],
+        x: float,
+        v: Float[np.ndarray, " points"],
+        count: int,
+        states: np.ndarray,
     ) -> Float[np.ndarray, " points"]:
         """The force [N] after so many milliseconds at constant velocities, or where the states stand still.
 
         Arguments:
             p: all numbers.
+            x: the stroke [m].
             v: the velocities [m/s].
             count: steps of a millisecond.
             states: of each point, shape (points, states), which are changed.
         """
         forces = np.empty(v.size)
-        self._hold(p.ctypes.data, v.size, v.ctypes.data, count, states.ctypes.data, forces.ctypes.data)
+        self._hold(p.ctypes.data, x, v.size, v.ctypes.data, count, states.ctypes.data, forces.ctypes.data)
         return forces
 
     def linearise(

@@ -1,5 +1,6 @@
 """The force of a law under a prescribed stroke."""
 
+import operator
 from abc import abstractmethod
 from typing import Literal, TypedDict, Unpack, overload
 
@@ -15,9 +16,11 @@ from jaxdamp._types import Signal, SignalLike, State
 from jaxdamp._warned import warn
 from jaxdamp.dampers import (
     AbstractDamper,
+    Heated,
     Motion,
     check_commands,
     has_fitted_range,
+    laws_inside,
     range_use,
     require_finite_force,
     sentence,
@@ -25,6 +28,7 @@ from jaxdamp.dampers import (
 )
 from jaxdamp.parameters import as_float
 from jaxdamp.rig.marching import Followed, march_states, step_and_rate
+from jaxdamp.rig.strokes import refuse_strokes
 
 
 IN_MOTION = 0.1  # of the largest velocity, above which a record begins in motion
@@ -104,11 +108,11 @@ def respond(
 
     A motion outside the range that the law was fitted to (`law.fitted_to`) gives an `OutsideFittedRangeWarning`.
 
-    A law with states starts at rest (`law.initial_state()`) unless it is given a `state`. In a record that begins in
-    motion it then needs about a cycle, or a few lag times, to forget the start, and a `StartsInMotionWarning` says so.
-    Better starts are the state after a cycle of a periodic motion (`return_state`) and that of a constant velocity
-    (`rig.quasi_static(law, velocity[:1]).states[0]`). A long record can be computed in pieces: each begins with the
-    last sample and the state of the one before.
+    A law with states starts at rest at the first stroke (`law.state_at_rest(stroke[0])`) unless it is given a `state`.
+    In a record that begins in motion it then needs about a cycle, or a few lag times, to forget the start, and a
+    `StartsInMotionWarning` says so. Better starts are the state after a cycle of a periodic motion (`return_state`) and
+    that of a constant velocity (`rig.quasi_static(law, velocity[:1], stroke=stroke[0]).states[0]`). A long record can
+    be computed in pieces: each begins with the last sample and the state of the one before.
 
     Arguments:
         law: the damper law.
@@ -146,26 +150,29 @@ def respond(
     time, stroke = as_float(time), as_float(stroke)
     _check_record(instants, time, stroke, velocity)
     _checks.untraced("substeps", substeps, "The number of steps is part of a compiled program: give a plain number.")
-    if substeps < 1:
-        _checks.refuse("substeps", "be 1 or more", substeps)
+    _checks.counts(substeps=substeps)
+    substeps = operator.index(substeps)
     dt, rate = step_and_rate(time, stroke, None if velocity is None else as_float(velocity))
-    _refuse_strokes(law, stroke)
+    if (known := _checks.concrete(stroke)) is not None:
+        refuse_strokes(law, "stroke", known.min(), known.max())
     if engine is not None:
         _refuse_beside_engine(temperature, command, substeps, state, return_state)
     if temperature is not None:
         temperature = _of_instants(law, temperature, time)
     if command is not None:
         command = _commands(law, command, time)
+    followed = Followed(temperature, command)
     if state is None:
-        _warn_of_motion(law, rate)
+        _warn_of_motion(followed.first(law), stroke, rate)
     last: State | None = None
     if engine is not None:
         check_module("engine", engine, (AbstractLawEngine,), "respond(law, time, stroke, engine=...)")
         force = engine.respond(law, time, stroke, rate)
     else:
-        followed = Followed(temperature, command)
         begin = None if state is None else _checked_state(law, state, followed)
         force, last = march_states(law, dt, stroke, rate, substeps, followed, begin)
+    if force.shape != time.shape:
+        _checks.refuse("law", "give one number as force", f"{type(law).__name__}, which gives {force.shape[1:]}")
     require_finite_force(law, force, "over the whole motion")
     _warn_of_range(law, stroke, rate, force)
     return (force, last) if return_state and last is not None else force
@@ -210,16 +217,19 @@ def _checked_state(law: AbstractDamper, state: object, followed: Followed) -> St
     return begin
 
 
-def _warn_of_motion(law: AbstractDamper, velocity: Signal) -> None:
-    """Say that a law with states starts at rest in a record that begins in motion."""
-    values = _checks.concrete(velocity)
-    if values is None or not law.initial_state().size or abs(values[0]) <= IN_MOTION * np.abs(values).max():
+def _warn_of_motion(law: AbstractDamper, stroke: Signal, velocity: Signal) -> None:
+    """Say that a law with states, other than its heat, starts at rest in a record that begins in motion."""
+    values, x = _checks.concrete(velocity), _checks.concrete(stroke)
+    rises = sum(isinstance(part, Heated) for _, part in laws_inside(law))
+    if values is None or x is None or law.initial_state().size == rises:
+        return
+    if abs(values[0]) <= IN_MOTION * np.abs(values).max():
         return
     text = (
         f"The record begins at {values[0]:.3g} m/s, but the states of {type(law).__name__} start at rest: the first "
         "forces are wrong, for about a cycle or a few lag times. Begin at rest, or pass a state: "
-        "`rig.quasi_static(law, velocity[:1]).states[0]`, that after a cycle (`return_state=True`), or "
-        "`law.initial_state()` if it is meant."
+        f"`rig.quasi_static(law, velocity[:1], stroke={x[0]:.4g}).states[0]`, that after a cycle "
+        f"(`return_state=True`), or `law.state_at_rest({x[0]:.4g})` if it is meant."
     )
     warn(text, StartsInMotionWarning)
 
@@ -231,7 +241,7 @@ def _of_instants(law: AbstractDamper, temperature: Float[ArrayLike, "..."], time
         _checks.refuse("temperature", "be left out beside a law that does not depend on it", repr(law), remedy)
     if jnp.shape(temperature) not in ((), time.shape):
         _checks.refuse("temperature", "be one value or as long as `time`", f"of shape {jnp.shape(temperature)}")
-    _checks.positive("temperature", temperature, "It is in kelvin.")
+    _checks.kelvin("temperature", temperature)
     return jnp.broadcast_to(as_float(temperature), time.shape)
 
 
@@ -251,16 +261,3 @@ def _warn_of_range(law: AbstractDamper, *channels: Signal) -> None:
             stroke, velocity, force = (np.asarray(values, dtype=float) for values in known)
             motion = Motion(stroke, velocity, force)
             warn_outside([sentence(type(law).__name__, range_use(law, motion))])
-
-
-def _refuse_strokes(law: AbstractDamper, stroke: Signal) -> None:
-    """Refuse strokes outside the limits of a law."""
-    values = _checks.concrete(stroke)
-    for term in law.side_by_side():
-        low, high = (_checks.concrete(limit) for limit in term.stroke_limits)
-        if values is None or low is None or high is None:
-            continue
-        if values.min() < low or values.max() > high:
-            must = f"stay from {low:.4g} to {high:.4g} m for {type(term).__name__}"
-            value = f"from {values.min():.4g} to {values.max():.4g} m"
-            _checks.refuse("stroke", must, value, "The law's volumes are those at stroke zero: shift the stroke.")
