@@ -5,6 +5,7 @@ from jaxtyping import Float
 
 
 Samples = Float[np.ndarray, " time"]
+_FEWEST_SAMPLES = 16  # of a record of one cycle
 
 
 def crossings(time: Samples, stroke: Samples) -> tuple[Float[np.ndarray, " rising"], Float[np.ndarray, " falling"]]:
@@ -43,8 +44,8 @@ def _instants(time: Samples, x: Samples, starts: np.ndarray, stops: np.ndarray) 
 def dominant_frequency(time: Samples, stroke: Samples) -> float:
     """Frequency of the stroke [Hz]: one over the median time between passages of its middle in the same direction.
 
-    Rest before and after the motion does not count. Where no direction is passed twice it is the highest line of the
-    spectrum.
+    Rest before and after the motion does not count. Where no direction is passed twice, it is that of one cycle if the
+    record ends where it began, as a mean cycle does, or else the highest line of the spectrum.
     """
     return _frequency(time, stroke, crossings(time, stroke))
 
@@ -53,9 +54,30 @@ def _frequency(time: Samples, stroke: Samples, passages: tuple[np.ndarray, np.nd
     periods = np.concatenate([np.diff(instants) for instants in passages])
     if len(periods):
         return float(1 / np.median(periods))
+    if (period := single_cycle(time, stroke)) is not None:
+        return 1 / period
     x, step = stroke - np.mean(stroke), (time[-1] - time[0]) / (len(time) - 1)
     size = 8 * len(x)
     return float((1 + np.argmax(np.abs(np.fft.rfft(x, size))[1:])) / (size * step))
+
+
+def single_cycle(time: Samples, stroke: Samples) -> float | None:
+    """The period [s] of a record that is one cycle, whose last sample is its first or the one before; else None.
+
+    A transient that begins and ends at rest is no cycle.
+    """
+    if len(stroke) < _FEWEST_SAMPLES:
+        return None
+    size, step = float(np.ptp(stroke)), (time[-1] - time[0]) / (len(time) - 1)
+    near = np.abs(stroke - stroke[0]) < 0.01 * size
+    still = max(int(np.argmin(near)), int(np.argmin(near[::-1])))
+    noise = 4.0 * white_noise(stroke)
+    rise = 0.5 * (stroke[1] - stroke[0] + stroke[-1] - stroke[-2])
+    meets, follows = abs(stroke[-1] - stroke[0]), abs(stroke[-1] + rise - stroke[0])
+    alike = abs(stroke[1] - stroke[0] - (stroke[-1] - stroke[-2])) < 0.2 * np.max(np.abs(np.diff(stroke))) + 2 * noise
+    if still > 0.1 * len(stroke) or not alike or min(meets, follows) > 0.5 * np.max(np.abs(np.diff(stroke))) + noise:
+        return None
+    return float((len(stroke) - (meets < follows)) * step)
 
 
 def cycle_instants(time: Samples, stroke: Samples) -> Float[np.ndarray, " instants"]:
@@ -66,6 +88,8 @@ def cycle_instants(time: Samples, stroke: Samples) -> Float[np.ndarray, " instan
     """
     passages = crossings(time, stroke)
     period = 1 / _frequency(time, stroke, passages)
+    if max(map(len, passages)) < 2 and single_cycle(time, stroke) is not None:
+        return np.array([time[0], time[0] + period])
     return max((extended(time, stroke, instants, period) for instants in passages), key=len)
 
 

@@ -220,7 +220,7 @@ def _subtract(run: "BenchRun", found: "GasAndFriction") -> "BenchRun":
 
 
 def _mean_cycle(run: "BenchRun") -> "BenchRun":
-    """The mean cycle at equal steps of time, two periods of it, so that it is a record with a full cycle."""
+    """The mean cycle at equal steps of time."""
     from jaxdamp.bench.analysis import fold_cycles
 
     if run.command_channel is not None:
@@ -231,15 +231,15 @@ def _mean_cycle(run: "BenchRun") -> "BenchRun":
     cycles = fold_cycles(run)
     count, period = len(cycles.periods), float(cycles.periods.mean())
     points = cycles.force.shape[1]
-    time = np.arange(2 * points) * (period / points)
+    time = np.arange(points) * (period / points)
     channels: dict[str, Float[np.ndarray, " time"] | Samples] = {
-        name: np.tile(getattr(cycles, name).mean(axis=0), 2) for name in CHANNELS
+        name: getattr(cycles, name).mean(axis=0) for name in CHANNELS
     }
     warm = None
     if run.temperature is not None:
         during = (run.time >= cycles.starts[0]) & (run.time < cycles.starts[-1] + cycles.periods[-1])
         warm = np.full(len(time), float(np.mean(run.temperature[during])))
     scatter = f"{np.sqrt(np.mean(np.var(cycles.force, axis=0, ddof=1))):.3g} N" if count > 1 else "unknown"
-    note = f"mean cycle over {count} cycles, twice; scatter of the force from cycle to cycle {scatter} (RMS)"
+    note = f"mean cycle over {count} cycles; scatter of the force from cycle to cycle {scatter} (RMS)"
     note += "" if warm is None else f", at their mean temperature, {warm[0] - 273.15:.3g} °C"
     return _noted(run, note, time=time, **channels, temperature=warm)

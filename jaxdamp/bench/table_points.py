@@ -205,7 +205,7 @@ def curves_of(sides: Sequence[Side], how: How) -> tuple[tuple[Curve, ...], list[
     columns: dict[tuple[str, str, int], str] = {}
     for side in sides:
         velocity, force = _oriented(side, how, notes)
-        for direction, there in ((1, velocity >= 0.0), (-1, velocity < 0.0)):
+        for direction, there in ((1, ~np.signbit(velocity)), (-1, np.signbit(velocity))):  # −0.0 is of compression
             if there.any():
                 _once(side, direction, columns)
                 points[direction].setdefault(side.setting, []).append(np.stack([velocity[there], force[there]]))

@@ -6,12 +6,14 @@ A difference of neighbouring samples multiplies noise of σ metres by √2 times
 * harmonic regression: a steady sine of a test bench is a few harmonics of one frequency. Frequency and harmonics are
   fitted to the whole record and differentiated exactly; noise, mains ripple and quantisation average out.
 * Savitzky-Golay: the slope of a cubic or quintic fitted around every sample. The window is the one with the least
-  expected error, judged by the spectrum of the record: what lies within ten times the frequency of the motion and
-  above the noise is motion, the rest is noise.
+  expected error, judged by the spectrum of the record: what is above the noise within ten times the frequency of the
+  motion is motion. So is what is faster, as on roads, if it is one percent of the stroke or more, and 0.3 % at the
+  multiples of this frequency, as in the corners of triangles. Less is ripple, as is what lies at multiples of 50 and
+  60 Hz.
 """
 
 import numpy as np
-from jaxtyping import ArrayLike, Float
+from jaxtyping import ArrayLike, Bool, Float
 
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
@@ -32,6 +34,10 @@ _STEADY = 0.004  # amplitude by which a cycle may differ from the mean cycle
 _UNSTEADY = 0.5  # the same, beyond which a look at some of the samples is enough
 _ENOUGH, _A_CYCLE = 20_000, 20  # samples, in all and in a cycle, of such a look
 _LAST_SHARE = 0.005  # of the highest harmonics in the velocity, relative to the fundamental
+_SLOW = 10.0  # times the frequency of the motion
+_FAST_SHARE, _REPEATED_SHARE = 0.01, 0.003  # of the stroke, above which what is faster is motion
+_MAINS = (50.0, 60.0)  # Hz
+_SAID = 0.02  # of the velocity, above which ripple that is left out is named
 _QUIET = 0.03  # residual, relative to the amplitude, that is taken for ripple and noise of any colour
 
 
@@ -87,10 +93,11 @@ def estimate_velocity(time: ArrayLike, stroke: ArrayLike, *, method: str | None 
                 "Cut rest and run-up away, or use 'savitzky-golay'.",
             )
     rate = (len(time) - 1) / (time[-1] - time[0])
-    window, order = _window(stroke, rate, frequency)
+    window, order, ripple = _window(stroke, rate, frequency)
     velocity = rate * savitzky_golay(stroke, window, order, derivative=1)
     width = f"{window} samples ({1e3 * (window - 1) / rate:.3g} ms)"
-    return velocity, f"velocity from the stroke by a Savitzky-Golay filter of {width}, order {order}"
+    left = f", without ripple above {_SLOW * frequency:.3g} Hz of {100 * ripple:.2g} % of it" * (ripple > _SAID)
+    return velocity, f"velocity from the stroke by a Savitzky-Golay filter of {width}, order {order}{left}"
 
 
 def _basis(phase: Samples, harmonics: int) -> Float[np.ndarray, "time columns"]:
@@ -202,14 +209,23 @@ def _in_cycles(t: Samples, residual: Samples, omega: float) -> tuple[Float[np.nd
     return (2 * np.hypot(cosine, sine) / np.maximum(count, 1))[full], int(count.max())
 
 
-def _window(stroke: Samples, rate: float, frequency: float) -> tuple[int, int]:
-    """Length and order of the Savitzky-Golay filter with the least expected error of the velocity."""
+def _window(stroke: Samples, rate: float, frequency: float) -> tuple[int, int, float]:
+    """Length and order of the Savitzky-Golay filter with the least expected error of the velocity.
+
+    The third number is the share of ripple that is above the noise in the RMS velocity.
+    """
     count = len(stroke)
     spectrum = np.abs(np.fft.rfft((stroke - np.mean(stroke)) * np.hanning(count))) ** 2
     omega = 2 * np.pi * np.fft.rfftfreq(count)  # per sample
     floor = float(np.median(spectrum[len(spectrum) // 2 :])) / np.log(2)
-    seen = (omega < 20 * np.pi * frequency / rate) & (spectrum > 10 * floor)
-    motion = np.where(seen, spectrum - floor, 0.0)
+    seen, slow = spectrum > 10 * floor, omega < 2 * np.pi * _SLOW * frequency / rate
+    frequencies = omega * rate / (2 * np.pi)
+    fast = seen & ~slow & ~np.any([_near_multiples(frequencies, mains) for mains in _MAINS], axis=0)
+    for part, share in ((fast, _FAST_SHARE), (fast & _near_multiples(frequencies, frequency), _REPEATED_SHARE)):
+        if np.sum(spectrum[part]) > share**2 * np.sum(spectrum[seen]):
+            slow |= part
+    motion, of_velocity = np.where(seen & slow, spectrum - floor, 0.0), omega**2 * (spectrum - floor)
+    ripple = np.sqrt(np.sum(of_velocity[seen & ~slow]) / max(np.sum(of_velocity[seen]), np.finfo(float).tiny))
     longest = min(max(rate / frequency, 5), count - 1)
     best = (np.inf, 5, 3)
     for order in (3, 5):
@@ -219,7 +235,13 @@ def _window(stroke: Samples, rate: float, frequency: float) -> tuple[int, int]:
             error = float(np.sum(motion * (response - omega) ** 2 + (spectrum - motion) * response**2))
             best = min(best, (error, 2 * half + 1, order))
             half = max(half + 1, round(1.2 * half))
-    return best[1], best[2]
+    return best[1], best[2], float(ripple)
+
+
+def _near_multiples(frequencies: Float[np.ndarray, " lines"], base: float) -> Bool[np.ndarray, " lines"]:
+    """Which lines are within three of a multiple of a frequency [Hz]."""
+    width = 3 * (frequencies[1] - frequencies[0])
+    return np.abs((frequencies + 0.5 * base) % base - 0.5 * base) <= width
 
 
 def _response(half: int, order: int, omega: Float[np.ndarray, " lines"]) -> Float[np.ndarray, " lines"]:

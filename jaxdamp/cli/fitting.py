@@ -18,6 +18,7 @@ from jaxdamp.cli.signatures import Arguments
 from jaxdamp.cli.vehicle_words import read_law
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Comparison, CrossValidation, Failure, Rung
+from jaxdamp.parameters import name_patterns
 from jaxdamp.report import (
     Attempts,
     failure_sentences,
@@ -202,7 +203,9 @@ class Fits(NamedTuple):
         screen, name, rig = self.work.screen, best.name, self.options["rig"]
         with self.work.attempts.part(f"The cross-validation of {name}"), screen.stage("Leaving out each record"):
             named = {name: best.result.law} if best.reduced else identify.default_ladder(tuple(runs), [name], rig=rig)
-            validation = identify.cross_validate(named, tuple(runs), rig=rig, freeze=best.held)
+            how = {name: self.options[name] for name in identify.FitSettings.__annotations__ if name in self.options}
+            how |= {"freeze": (*name_patterns("freeze", how.get("freeze", ())), *best.held), "bad_records": "keep"}
+            validation = identify.cross_validate(named, tuple(runs), rig=rig, **how)
             screen.table(validation.record_table())
             return validation
         return None

@@ -52,7 +52,7 @@ def sample_motion(law: AbstractDamper, step: float = _STEP) -> tuple[np.ndarray,
 def law_test(program: LawProgram, name: str) -> str:
     """The text of the program for a law; it returns zero if the greatest difference is due to rounding."""
     time, stroke, velocity = sample_motion(program.law)
-    computed = respond(program.law, time, stroke, velocity, state=program.law.initial_state())
+    computed = respond(program.law, time, stroke, velocity, state=program.law.state_at_rest(0.0))
     arrays = {"x": stroke, "v": velocity, "expected": np.asarray(computed, float)}
     real, close = LANGUAGE.types[program.dtype], _tolerance(program.dtype, computed.dtype)
     return f"""{_begin(name, "forces", arrays)}

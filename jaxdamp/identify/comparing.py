@@ -149,7 +149,7 @@ def compare(
     Arguments:
         laws: starts by name, such as `default_ladder(runs)`; or vehicles, such as `friction_ladder(car)`.
         runs: records to fit.
-        held_out: records to judge on, which are not fitted, instead of parts of `runs`.
+        held_out: records to judge on, which are not fitted even if they are among `runs`, instead of parts of `runs`.
         rig: the test machine of all fits, as in `fit`; a zero error of the load cell if left out, since a law that must
             explain it comes out wrong. `None` is a machine that adds nothing.
         scheduled: whether the parameters of each law are functions of the records' command, as in `fit_scheduled`;
@@ -175,6 +175,10 @@ def compare(
     robust, bad_records = settings["loss"] != "squares", settings["bad_records"]
     runs = usable(as_runs(runs, call=call), bad_records, robust=robust)
     held_out = usable(as_runs(held_out, "held_out"), bad_records, robust=robust, argument="held_out")
+    judged_on = {run.fingerprint for run in held_out}
+    runs = tuple(run for run in runs if run.fingerprint not in judged_on)
+    if not runs:
+        _checks.refuse("held_out", "leave records to fit", f"all {len(held_out)} of them")
     with Progress("Fitting") as shown:
         numbers = itertools.count(1)
 

@@ -23,6 +23,9 @@ from jaxdamp.parameters import FreeParameters, get, match_paths
 
 ROUNDS = 20  # of least squares with new weights, at most
 SETTLED = 0.01  # standard errors that a last round moves
+CONTRADICTED = 5.0  # standard deviations from a prior that it does not allow
+NEXT_TO_NOTHING = 1e-6  # of the noise
+QUIETER = 0.8  # noise of a fit without priors, relative to that with them, below which these are wrong
 FIRST_NOISE = 0.01  # of the RMS force, before a fit says more
 HALF = 0.5  # weight below which a sample is counted as left out
 
@@ -170,6 +173,42 @@ def solve_by(
     if priors:
         solution = solution._replace(noise=float(priors[0].noise))  # which stays where nothing is left to explain
     rounds = 1 if loss == "squares" and not any(part.relative for part in priors) else ROUNDS
+    found = _in_rounds(problem, solution, solve, loss=loss, noise=noise, spread=spread, rounds=rounds)
+    if loss != "squares" or rounds == 1:
+        return found
+    return _without_its_own_noise(found, solve, noise, starts)
+
+
+def _without_its_own_noise(
+    found: tuple[Problem, Solution],
+    solve: Callable[[Problem, int | None], Solution],
+    noise: Callable[[Problem, SearchEnd], Noise],
+    starts: int | None,
+) -> tuple[Problem, Solution]:
+    """The fit with priors beside the noise of one without them, where that is less.
+
+    What a wrong prior makes a fit miss counts as noise, beside which it weighs the more.
+    """
+    problem, beside = found[0], found[1].noise or 0.0
+    alone = solve(problem.at_noise(NEXT_TO_NOTHING * beside), starts).best
+    level = float(np.sqrt(noise(problem, alone).variance)) if alone.finite else np.inf
+    if not level < QUIETER * beside or problem.is_rounding(alone.squares):
+        return found
+    weighed = problem.at_noise(level)
+    return weighed, solve(weighed.started_at(alone.values), 1)._replace(noise=level)
+
+
+def _in_rounds(
+    problem: Problem,
+    solution: Solution,
+    solve: Callable[[Problem, int | None], Solution],
+    *,
+    loss: str,
+    noise: Callable[[Problem, SearchEnd], Noise],
+    spread: float | None,
+    rounds: int,
+) -> tuple[Problem, Solution]:
+    """So many rounds of least squares at most, each with the weights and the noise of the one before."""
     now = Round(problem)
     for _ in range(rounds):
         best = solution.best
@@ -185,6 +224,22 @@ def solve_by(
         if np.all(moved < SETTLED * level):
             break
     return now.problem, solution
+
+
+def against_priors(problem: Problem, values: Float[np.ndarray, " free"]) -> list[str]:
+    """A sentence on each number of the law or machine that the records put far from what was known beforehand."""
+    said, free = [], problem.free
+    for part in (part for part in problem.residuals if isinstance(part, Priors) and not part.weak):
+        for row in part.linear_rows(free):
+            i = int(np.argmax(row[:-1]))
+            deviation, mean = float(part.noise) / row[i], -row[-1] / row[i]
+            off, unit = abs(values[i] - mean) / deviation, f" {free.owners[i].unit}".rstrip()
+            if off > CONTRADICTED:
+                said.append(
+                    f"The records contradict the prior of {free.names[i]}, {mean:.5g} ± {deviation:.2g}{unit}: "
+                    f"{values[i]:.5g} is {off:.2g} standard deviations away. Check the prior, or give it a wider one."
+                )
+    return said
 
 
 def noise_factor(loss: Loss, relative: np.ndarray) -> float:

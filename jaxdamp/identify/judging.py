@@ -25,6 +25,7 @@ from jaxdamp.dampers import (
 from jaxdamp.identify.blending import off_span
 from jaxdamp.identify.contradicting import contradicting
 from jaxdamp.identify.covered import covered_range
+from jaxdamp.identify.criteria import against_priors
 from jaxdamp.identify.estimates import Estimate
 from jaxdamp.identify.estimating import Estimates, estimate, on_misfit
 from jaxdamp.identify.identifiability import gas_in_words
@@ -84,7 +85,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     law, rig = law_of(model), rig_of(model)
     fitted = np.isfinite(problem.sigma)
     percent, rmse, scores = score(models or model, problem.runs, fitted, problem.initial_state)
-    notes = on_status(best, estimates.unsettled, _REMEDY)
+    notes = on_status(best, estimates.unsettled, _REMEDY) + against_priors(problem, best.values)
     pooled = all(p.startswith("rig.") for p in problem.per_record) and not stated_values(model, problem.runs)
     on_records = (
         *notes_on(model, problem.fitted_to, pooled=pooled),

@@ -13,7 +13,7 @@ from jaxdamp._types import Scalar
 from jaxdamp.identify.criteria import ROUNDS, SETTLED, Priors, Round
 from jaxdamp.identify.dependence import Dependence, Products
 from jaxdamp.identify.initial_states import DRIFT
-from jaxdamp.identify.noise import CORRELATED, correlation_time
+from jaxdamp.identify.noise import CORRELATED, correlation_time, levels_differ
 from jaxdamp.identify.predicting import fit_percent, score
 from jaxdamp.identify.problem import ROUNDING, Problem
 from jaxdamp.identify.search import Here, Searches, searches_of
@@ -62,7 +62,8 @@ class Lanes(NamedTuple):
     ) -> Float[np.ndarray, " records"]:
         """Variance of the weighted residual in each record of a damper, larger where it is correlated unless known.
 
-        It is one for all records, or one for each if the problem weights them so or it is known.
+        It is one for all records, or one for each if the problem weights them so, it is known, or their levels of white
+        noise differ by more than chance.
         """
         problem, parts = self.problems[damper], self.of_records(damper, residual)
         if self.force_noise is not None:
@@ -70,7 +71,7 @@ class Lanes(NamedTuple):
         squares, sizes = (np.array(each, float) for each in zip(*((p @ p, p.size) for p in parts), strict=True))
         alike = correlation_time(parts)
         wider = problem.noise_factor**2 * (alike if alike > CORRELATED else 1.0)
-        if not problem.each:
+        if not (problem.each or (alike <= CORRELATED and levels_differ(problem, parts))):
             return np.full(sizes.shape, wider * np.sum(squares) / max(np.sum(sizes) - free, 1))
         return wider * squares / np.maximum(sizes * (1.0 - free / np.sum(sizes)), 1)
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy.special
 from jaxtyping import Bool, Float, Int
 
 from jaxdamp._triangles import orthonormal, unit_columns
@@ -11,6 +12,7 @@ from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
 
 
+BY_CHANCE = 1e-4  # probability of levels that differ as much
 CORRELATED = 3.0  # samples per independent sample above which residuals are called alike
 REPEATED = 0.3  # correlation of the residual with itself one cycle later above which the law misses something
 LEAST_OVERLAP = 0.5  # of a cycle, of a record with itself one cycle later
@@ -81,7 +83,7 @@ def _noise_of_records(problem: Problem, found: SearchEnd, force_noise: float | N
 
     The residual of each record gets an autoregression (Yule-Walker), whose order minimises a criterion like Schwarz's
     with `PENALTY` times its penalty. If all orders are zero, the noise is white, with one level for all records, or
-    one for each if the problem weights them so. Otherwise:
+    one for each if their levels differ by more than chance or the problem weights them so. Otherwise:
 
     - If the residual repeats from cycle to cycle, it is no noise: the law misses something. It then counts as white
       noise of so few samples as its correlation time leaves, which is the most that its errors can be.
@@ -99,7 +101,8 @@ def _noise_of_records(problem: Problem, found: SearchEnd, force_noise: float | N
     correlations = [np.ones(1)] if problem.is_rounding(found.squares) else [autocorrelation(part) for part in parts]
     is_white = all(alike.size == 1 for alike in correlations)
     if is_white or repeats(problem, parts):
-        level = np.sqrt(count / white.dof) * _levels(found.residual, records, problem.each)
+        each = problem.each or (is_white and levels_differ(problem, parts))
+        level = np.sqrt(count / white.dof) * _levels(found.residual, records, each)
         if is_white:
             return white.with_sigma(level)
         counted = max(correlation_time([part for part in parts if part.size]), 1.0)
@@ -107,6 +110,23 @@ def _noise_of_records(problem: Problem, found: SearchEnd, force_noise: float | N
         return few._replace(systematic=True).with_sigma(np.sqrt(counted) * level)
     noise = Noise(_levels(found.residual, records, True), records, tuple(correlations), 0.0, 1.0)
     return _corrected(noise, orthonormal(np.where(used[:, None], found.jacobian, 0.0)))
+
+
+def levels_differ(problem: Problem, parts: Sequence[Float[np.ndarray, " _"]]) -> bool:
+    """Whether the levels of white noise in several records differ by more than chance (Bartlett's test).
+
+    Not of the residuals of a robust fit, whose spikes are no normal noise.
+    """
+    parts = [part for part in parts if part.any()]
+    if len(parts) < 2 or problem.noise_factor != 1.0:
+        return False
+    counts, squares = (
+        np.array([(part.size, part @ part) for part in parts if part.size > 1 and part.any()]).reshape(-1, 2).T
+    )
+    if counts.size < 2:
+        return False
+    statistic = counts.sum() * np.log(squares.sum() / counts.sum()) - counts @ np.log(squares / counts)
+    return bool(statistic > scipy.special.chdtri(counts.size - 1, BY_CHANCE))
 
 
 def channel_noise(problem: Problem, residual: Float[np.ndarray, " samples"], free: int) -> Noise:

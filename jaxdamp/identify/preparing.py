@@ -145,7 +145,7 @@ def begun(
     frozen += not_chosen(model, asked["over"], "rig.", STARTS)
     frozen += [p.path for p in parameters(model) if p.path in stated]
     limits, tied = names.find_keys("bounds", bounds), names.find_keys("tie", tie)
-    free = free_parameters(spread(model, own, len(runs)), freeze=frozen, bounds=limits, tie=tied)
+    free = free_parameters(spread(model, own, len(runs)), freeze=frozen, bounds=limits, tie=tied, move=True)
     _checks.finite("law", free.values)
     known = priors_on(free, names.find_keys("priors", priors))
     return Beginning(begin, model, free, own, initial_state, (*known, *expected))

@@ -14,6 +14,7 @@ from jaxdamp.identify.initial_states import Cycle, moving_samples, repeated_moti
 from jaxdamp.identify.model import Model, blind_end
 
 
+LARGEST_TURN = 0.1  # of the peak velocity, by which it may change within an averaged block
 COARSEST = 0.48  # rad between samples, beyond which straight lines between them are the larger error
 LAG_ANGLE = 0.02  # rad, largest step of a filter of the force, whose law bends between samples where a valve opens
 
@@ -84,11 +85,20 @@ def channel(run: BenchRun, name: str) -> np.ndarray:
 
 
 def samples_in_block(run: BenchRun, samples_per_cycle: int | None) -> int:
-    """How many samples of a record are averaged; none where the command varies, which is faster than the motion."""
-    if run.command_channel is not None:
+    """How many samples of a record are averaged; none where the command varies, which is faster than the motion.
+
+    Fewer where the velocity turns within a block, as at the ends of a triangle: a mean force is not that of a mean
+    velocity there.
+    """
+    if run.command_channel is not None or samples_per_cycle is None:
         return 1
-    cycle = 2 * np.pi * run.sampling_rate / dominant_rate(run)
-    return 1 if samples_per_cycle is None else max(int(cycle / samples_per_cycle), 1)
+    block = max(int(2 * np.pi * run.sampling_rate / dominant_rate(run) / samples_per_cycle), 1)
+    while block > 1:
+        within = run.velocity[: len(run) // block * block].reshape(-1, block)
+        if np.ptp(within, axis=1).max() <= LARGEST_TURN * run.peak_velocity:
+            break
+        block //= 2
+    return block
 
 
 def resting_blocks(run: BenchRun, block: int) -> Bool[np.ndarray, " blocks"]:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -23,16 +23,18 @@ from jaxdamp.parameters._paths import (
 )
 
 
+INSIDE = 0.02  # of the width of bounds, by which a start is moved inside
 EXAMPLE = "Write for example tie={'front.damper.**': 'rear.damper.**'}: the front takes the values of the rear."
 
 
-def resolve_ties(known: Sequence[Parameter], tie: Mapping[str, str] | None) -> dict[str, str]:
+def resolve_ties(known: Sequence[Parameter], tie: Mapping[str, str] | None, *, move: bool = False) -> dict[str, str]:
     """The path whose value each tied parameter takes.
 
     Arguments:
         known: all parameters of the tree.
         tie: names or patterns of the parameters that follow, each with the name or pattern of those they follow; what a
             `*` or `**` stands for must be the same on both sides. A name without `*` may lead several parameters.
+        move: whether the values of partners may differ, as those of a start.
 
     Raises:
         ValueError: names that fit no parameter or no partner; a parameter tied twice or in a circle; partners of
@@ -52,7 +54,7 @@ def resolve_ties(known: Sequence[Parameter], tie: Mapping[str, str] | None) -> d
             if leaders.setdefault(path, partner) != partner:
                 remedy = f"It is tied to {leaders[path]} already."
                 _checks.refuse(f"tie[{follower!r}]", f"tie {path} once", f"tied to {partner} too", remedy)
-            _check_alike(f"tie[{follower!r}]", by_path[path], by_path[partner])
+            _check_alike(f"tie[{follower!r}]", by_path[path], by_path[partner], values=not move)
     return {path: _last(path, leaders) for path in leaders}
 
 
@@ -75,8 +77,8 @@ def _partner(path: str, follower: str, leader: str, candidates: Sequence[str]) -
     return chosen[0]
 
 
-def _check_alike(argument: str, follower: Parameter, leader: Parameter) -> None:
-    """Refuse to tie parameters that cannot have one value, or that start from different ones."""
+def _check_alike(argument: str, follower: Parameter, leader: Parameter, *, values: bool) -> None:
+    """Refuse to tie parameters that cannot have one value, or (`values`) that start from different ones."""
 
     def kind(p: Parameter) -> str:
         size = "one number" if p.value.ndim == 0 else f"numbers in shape {p.value.shape}"
@@ -85,9 +87,9 @@ def _check_alike(argument: str, follower: Parameter, leader: Parameter) -> None:
     if kind(follower) != kind(leader):
         both = f"{follower.path} is {kind(follower)}; {leader.path} is {kind(leader)}"
         _checks.refuse(argument, "tie parameters of one kind", f"of two: {both}")
-    values: list[PyTree] = [_checks.concrete(p.value) for p in (follower, leader)]
-    if not any(value is None for value in values) and not np.array_equal(*values):
-        both = f"{follower.path} = {values[0]} and {leader.path} = {values[1]}"
+    own: list[PyTree] = [_checks.concrete(p.value) for p in (follower, leader)]
+    if values and not any(value is None for value in own) and not np.array_equal(*own):
+        both = f"{follower.path} = {own[0]} and {leader.path} = {own[1]}"
         remedy = f"Set them equal first, with `jaxdamp.parameters.replace(..., {{{follower.path!r}: ...}})`."
         _checks.refuse(argument, "tie parameters that start from one value", f"of two: {both}", remedy)
 
@@ -183,6 +185,7 @@ def free_parameters(
     freeze: Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
     tie: Mapping[str, str] | None = None,
+    move: bool = False,
 ) -> FreeParameters:
     """Choose the parameters that a fit or a tuning may change.
 
@@ -195,6 +198,8 @@ def free_parameters(
         tie: parameters that take the values of others, as `{"front.damper.**": "rear.damper.**"}`; `*` and `**` stand
             for the same text on both sides. A group of tied parameters is one free value: it is free if `over` names
             one of them, frozen if `freeze` names one of them, and the bounds of one apply to all.
+        move: whether values outside their bounds, and tied ones that differ, are moved there instead of being refused,
+            as those of a start.
 
     Raises:
         ValueError: a name that fits no parameter; nothing left to change; bounds of a parameter that is not free, or of
@@ -215,7 +220,7 @@ def free_parameters(
         _checks.refuse("law", "have parameters", f"a {type(tree).__name__} without", remedy)
     keep = match_parameters(all_parameters, names)
     frozen = match_paths(known, name_patterns("freeze", freeze))
-    leaders = resolve_ties(all_parameters, tie)
+    leaders = resolve_ties(all_parameters, tie, move=move)
 
     def group(paths: Sequence[str]) -> set[str]:
         return {leaders.get(path, path) for path in paths}
@@ -224,13 +229,30 @@ def free_parameters(
     limits = _limits_by_path(known, free, leaders, bounds or {})
     linear = free - {leader for path, leader in leaders.items() if not all_parameters[known.index(path)].linear}
     chosen = [
-        dataclasses.replace(p, domain=_limited(p, limits.get(p.path)), linear=p.linear and p.path in linear)
+        dataclasses.replace(p, domain=_limited(p, limits.get(p.path), move=move), linear=p.linear and p.path in linear)
         for p in all_parameters
         if p.path in free
     ]
     if not chosen:
         raise ValueError(f"All parameters are frozen, nothing is left to change: {', '.join(known)}.")
-    return FreeParameters(tree, tuple(chosen), tuple(pair for pair in leaders.items() if pair[1] in free))
+    begun = FreeParameters(tree, tuple(chosen), tuple(pair for pair in leaders.items() if pair[1] in free))
+    return _moved_inside(begun, limits, move=move)
+
+
+def _moved_inside(free: FreeParameters, bounded: Collection[str], *, move: bool) -> FreeParameters:
+    """The same, values with bounds a little inside; an ordered vector that is not inside is spread over them."""
+    if not move or not (bounded or free.ties):
+        return free
+    (lower, upper), values = free.limits(), np.array(free.values, float)
+    width = np.where(np.isfinite(upper - lower), upper - lower, 0.0)
+    least, most = lower + INSIDE * width, upper - INSIDE * width
+    outside, begin = ~((values > lower) & (values < upper)), 0
+    for p in free.chosen:
+        here = slice(begin, begin := begin + p.value.size)
+        outside[here] &= p.path in bounded
+        if p.domain.ordered and np.any(outside[here]):
+            values[here] = np.linspace(least[here][0], most[here][0], p.value.size)
+    return free.started_at(np.where(outside, np.clip(values, least, most), values))
 
 
 def _known(tree: object, names: Sequence[str], tie: object) -> list[Parameter]:
@@ -260,14 +282,14 @@ def _limits_by_path(
     return limits
 
 
-def _limited(p: Parameter, limits: tuple[float, float] | None) -> PyTree:
+def _limited(p: Parameter, limits: tuple[float, float] | None, *, move: bool) -> PyTree:
     """The domain of a parameter within extra limits."""
     if limits is None:
         return p.domain
     limited = ordered_interval if p.domain.ordered else interval
     domain = limited(max(limits[0], p.domain.lower), min(limits[1], p.domain.upper))
     value = np.asarray(p.value)
-    if not np.all((value > domain.lower) & (value < domain.upper)):
+    if not move and not np.all((value > domain.lower) & (value < domain.upper)):
         remedy = "Start inside the bounds or widen them."
         _checks.refuse(p.path, f"start strictly {domain.name} [{p.unit}]", value, remedy)
     return domain

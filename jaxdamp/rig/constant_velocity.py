@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Hashable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -101,10 +101,8 @@ def as_warm_as_it_begins(law: AbstractDamper) -> AbstractDamper:
 class _Keyed:
     """What is remembered by a key, and with what it is computed."""
 
-    content: tuple[Any, ...]
-
-    def __init__(self, key: Hashable, *content: object) -> None:
-        self.key, self.content = key, content
+    def __init__(self, key: Hashable, law: AbstractDamper, velocities: Array, stroke: float) -> None:
+        self.key, self.content = key, (law, velocities, stroke)
 
     def __hash__(self) -> int:
         return hash(self.key)

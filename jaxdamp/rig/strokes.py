@@ -22,6 +22,7 @@ def refuse_strokes(law: AbstractDamper, argument: str, lowest: ArrayLike, highes
         if least is None or most is None or low is None or high is None:
             continue
         if np.any(least < low) or np.any(most > high):
-            must = f"keep the stroke from {low:.4g} to {high:.4g} m for {type(term).__name__}"
+            verb = "stay" if argument == "stroke" else "keep the stroke"
+            must = f"{verb} from {low:.4g} to {high:.4g} m for {type(term).__name__}"
             value = f"from {np.min(least):.4g} to {np.max(most):.4g} m"
             _checks.refuse(argument, must, value, "The law's volumes are those at stroke zero: shift the stroke.")

@@ -253,8 +253,8 @@ def _loop(target: AbstractDamper, start: MonoTube | TwinTube, frequency: float, 
     angle = 2.0 * np.pi * np.arange(2 * steps + 1) / steps
     stroke, velocity = amplitude * np.sin(angle), 2.0 * np.pi * frequency * amplitude * np.cos(angle)
     time = dt * np.arange(len(angle))
-    respond(start, time, stroke, velocity, state=start.initial_state())  # refuses strokes beyond its chambers
-    wanted = respond(target, time, stroke, velocity, state=target.initial_state())
+    respond(start, time, stroke, velocity, state=start.state_at_rest(stroke[0]))  # refuses strokes beyond its chambers
+    wanted = respond(target, time, stroke, velocity, state=target.state_at_rest(stroke[0]))
     return Loop(dt, stroke, velocity, np.asarray(wanted, float), steps)
 
 

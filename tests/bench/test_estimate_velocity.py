@@ -142,3 +142,41 @@ def test_the_filter_is_that_of_scipy(window, order, derivative, rng):
     weights = savitzky_golay_weights(window // 2, order, derivative)[window // 2]
     coefficients = np.asarray(savgol_coeffs(window, order, deriv=derivative, use="dot"))
     np.testing.assert_allclose(weights, coefficients, atol=1e-9 * np.max(np.abs(coefficients)))
+
+
+def _slow_and_fast(t):
+    w = 2 * np.pi
+    x = 0.02 * np.sin(0.5 * w * t) + 0.002 * np.sin(8 * w * t)
+    return x, w * (0.01 * np.cos(0.5 * w * t) + 0.016 * np.cos(8 * w * t))
+
+
+def _wide_band(t):
+    x, v = np.zeros_like(t), np.zeros_like(t)
+    for f, phase in zip(np.linspace(0.5, 20.0, 60), np.random.default_rng(0).uniform(0, 6, 60), strict=True):
+        x, v = x + 0.002 / f * np.sin(2 * np.pi * f * t + phase), v + 0.004 * np.pi * np.cos(2 * np.pi * f * t + phase)
+    return x, v
+
+
+def _rounded_triangle(t):
+    near, w = 1.0 - 1e-3, 2 * np.pi
+    inner = near * np.sin(w * t)
+    return 0.0127 * np.arcsin(inner), 0.0127 * near * w * np.cos(w * t) / np.sqrt(1.0 - inner**2)
+
+
+@pytest.mark.parametrize("motion", [_slow_and_fast, _wide_band, _rounded_triangle])
+@pytest.mark.parametrize("noise", [0.0, 2e-6])
+def test_fast_motion_is_no_noise(motion, noise, rng):
+    """Above ten times the frequency of the motion too: the velocity was up to 85 % wrong."""
+    t = np.arange(8000) / 1000
+    x, v = motion(t)
+    velocity, how = estimate_velocity(t, x + noise * rng.standard_normal(t.size))
+    assert "ripple" not in how
+    assert np.std(velocity - v) < 0.02 * np.std(v)
+
+
+def test_ripple_of_the_mains_is_left_out_and_named(rng):
+    t = np.arange(20000) / 1000
+    grown = 0.002 * (1.0 + 0.1 * t / 20) * np.sin(2 * np.pi * 0.2 * t)
+    velocity, how = estimate_velocity(t, grown + 1e-5 * np.sin(2 * np.pi * 50 * t))
+    assert np.std(velocity - np.gradient(grown, t)) < 0.005 * np.std(velocity)
+    assert "without ripple above 2 Hz of" in how

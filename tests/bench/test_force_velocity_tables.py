@@ -191,3 +191,12 @@ def test_a_record_whose_time_only_stumbles_is_still_refused(tmp_path):
     rows = [f"{t:.4f},{x:.5f},{f:.6f}" for t, x, f in zip(times, *WAVE, strict=True)]
     with pytest.raises(ValueError, match="must increase"):
         bench.read(written(tmp_path, "\n".join(["t_s,x_mm,F_kN", *rows]), "a.csv"))
+
+
+@pytest.mark.parametrize("headers", ["rebound [N],compression [N]", "4 clicks rebound [N],4 clicks compression [N]"])
+def test_a_row_at_zero_velocity_belongs_to_both_directions(tmp_path, headers):
+    file = tmp_path / "sheet.csv"
+    file.write_text(f"velocity [m/s],{headers}\n0,0,0\n0.1,200,100\n0.2,300,150\n")
+    (curve,) = bench.read_table(file).curves
+    np.testing.assert_allclose(curve.velocity, [-0.2, -0.1, 0.0, 0.1, 0.2])
+    np.testing.assert_allclose(curve.force, [-150.0, -100.0, 0.0, 200.0, 300.0])

@@ -232,3 +232,13 @@ def test_the_start_of_a_sine_has_no_ripple_of_the_mains():
     velocity = 0.02 * 4 * np.pi * np.cos(4 * np.pi * time)
     run = BenchRun.from_arrays("short", time, stroke, 600 * np.tanh(velocity / 0.1) + 800 * velocity - 300.0)
     assert not [found for found in preflight(run).findings if "ripple" in found.name]
+
+
+@pytest.mark.parametrize("frequency", [10.0, 20.0])
+def test_a_long_delay_is_told_as_it_is(frequency, rng):
+    """By the angle of the harmonics, not by its tangent: 3.3 ms for 3."""
+    w, t = 2 * np.pi * frequency, np.arange(2000) / 4000
+    late = 0.002 * w * np.cos(w * (t - 3e-3))
+    force = np.where(late > 0, 2600.0, 1200.0) * late + rng.normal(0.0, 3.0, t.size)
+    (finding,) = preflight(BenchRun.from_arrays("late", t, 0.002 * np.sin(w * t), force)).named("delay")
+    assert finding.size == pytest.approx(3e-3, rel=0.01)

@@ -243,3 +243,8 @@ def test_what_javascript_lacks_is_refused_by_name():
     single = lower(lambda x: x + 1.0, symbols("x", (), "float32"))
     with pytest.raises(NotImplementedError, match="float32"):
         list(JavaScript().lines(single.statements, 0))
+
+
+def test_complex_numbers_are_refused_by_name():
+    with pytest.raises(NotImplementedError, match="Complex numbers cannot be printed"):
+        lower(lambda v: jnp.abs(jnp.exp(lax.complex(v, v))), symbols("v"))

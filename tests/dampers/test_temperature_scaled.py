@@ -110,7 +110,8 @@ def test_a_measured_temperature_in_a_response():
     wrong = [
         (Linear(1.0), temperature, "beside a law that does not depend"),
         (law, temperature[1:], "as long as `time`"),
-        (law, -1.0, "positive"),
+        (law, -1.0, "in kelvin, above 150, but is -1.0"),
+        (law, 60.0, "in kelvin, above 150"),
     ]
     for other, value, message in wrong:
         with pytest.raises(ValueError, match=f"`temperature` must be .*{message}"):

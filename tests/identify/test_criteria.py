@@ -134,3 +134,15 @@ def test_the_bias_by_noise_of_the_velocity_is_reported(sines):
 def test_what_is_refused(sines, options: dict[str, Any], message: str):
     with pytest.raises(ValueError, match=message):
         fit(Linear(1000.0), sines(Linear(1500.0)), **options)
+
+
+@pytest.mark.parametrize("mean", [2250.0, 2300.0])
+def test_a_prior_that_the_records_contradict_does_not_win_by_the_noise_it_makes(sines, mean):
+    runs = sines(TRUTH, noise=10.0)
+    alone = fit(Bilinear, runs, samples_per_cycle=None)["rebound_rate"]
+    weights = alone.standard_error**-2, 5.0**-2
+    expected = np.average([alone.value, mean], weights=weights)
+    result = fit(Bilinear, runs, samples_per_cycle=None, priors={"rebound_rate": (mean, 5.0)})
+    assert result["rebound_rate"].value == pytest.approx(expected, abs=0.2 * (alone.value - expected))
+    assert result["compression_rate"].value == pytest.approx(1200.0, rel=5e-3)
+    assert any("contradict the prior of rebound_rate" in warning for warning in result.warnings)

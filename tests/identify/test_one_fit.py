@@ -7,7 +7,7 @@ import optimistix as optx
 import pytest
 
 from jaxdamp import bench, identify, roads
-from jaxdamp.dampers import Bilinear
+from jaxdamp.dampers import Bilinear, Linear
 from jaxdamp.parameters import replace
 from jaxdamp.vehicles import QuarterCar
 
@@ -148,3 +148,12 @@ def test_over_names_what_a_law_may_change(runs):
     held = identify.fit(Bilinear(2000.0, 1200.0), runs, over=["rebound_rate"], rig=["offset"])
     assert [e.name for e in held.parameters] == ["law.rebound_rate", "rig.force_offset"]
     assert float(held.law.compression_rate) == 1200.0
+
+
+def test_records_held_out_of_a_comparison_are_not_fitted(sines):
+    runs = sines(Bilinear(2600.0, 1200.0), noise=5.0)
+    same, apart = (identify.compare({"linear": Linear}, some, held_out=runs[-1:]) for some in (runs, runs[:-1]))
+    assert same.best.held_out_rmse == apart.best.held_out_rmse
+    assert [run.name for run in same.best.result.runs] == [run.name for run in runs[:-1]]
+    with pytest.raises(ValueError, match="`held_out` must leave records to fit, but is all"):
+        identify.compare({"linear": Linear}, runs, held_out=runs)

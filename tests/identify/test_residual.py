@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from jaxdamp import bench, identify
-from jaxdamp.bench import BenchSet, SineTest
+from jaxdamp.bench import BenchRun, BenchSet, SineTest
 from jaxdamp.dampers import AbstractDamper, Bilinear, Lag, Linear
 from jaxdamp.identify import error_shares
+from jaxdamp.identify.rows import samples_in_block
 
 
 TESTS = [SineTest(0.01, f) for f in (1.0, 3.0, 6.0)]
@@ -120,3 +121,13 @@ def test_every_law_of_the_ladder_has_a_line_that_says_whether_it_has_hysteresis(
         assert isinstance(start, AbstractDamper)
         assert rows[name]["hysteresis"] == ("yes" if start.initial_state().size else "no")
         assert len(str(rows[name]["what it is"]).split()) > 2
+
+
+def test_samples_are_not_averaged_over_the_turns_of_a_triangle():
+    """A mean force is not that of a mean velocity there: an exact law was said to miss something."""
+    t = np.arange(4000) / 1000
+    inner = (1.0 - 1e-3) * np.sin(2 * np.pi * t)
+    velocity = 0.0254 * np.pi * np.cos(2 * np.pi * t) / np.sqrt(1.0 - inner**2)
+    triangle = BenchRun("triangle", t, 0.0127 * np.arcsin(inner), velocity, 2000.0 * velocity)
+    sine = BenchRun("sine", t, 0.02 * np.sin(2 * np.pi * t), 0.04 * np.pi * np.cos(2 * np.pi * t), velocity)
+    assert samples_in_block(triangle, 200) < samples_in_block(sine, 200)

@@ -160,3 +160,19 @@ def test_all_certain_numbers_are_moved_away(monkeypatch):
     monkeypatch.setattr(estimating, "profile", profiled)
     fit(default_ladder(runs, ["visco_plastic_spring"])["visco_plastic_spring"], runs, starts=1)
     assert len(certain) > 6 and moved == set(certain)
+
+
+def test_white_noise_of_records_has_a_level_for_each_where_they_differ():
+    """The value of a noisy record alone was called four times too certain."""
+    scores = []
+    for seed in range(25):
+        rng, runs = np.random.default_rng(seed), []
+        for i in range(3):
+            t = np.arange(800) / 400
+            v = 0.02 * 2 * np.pi * np.cos(2 * np.pi * t)
+            force = 2000.0 * v + rng.normal(0.0, 5.0 if i else 50.0, t.size)
+            runs.append(BenchRun(f"{i}", t, 0.02 * np.sin(2 * np.pi * t), v, force))
+        result = fit(Linear, runs, per_record=["rate"])
+        scores.append([(e.value - 2000.0) / e.standard_error for e in result.parameters[:3]])
+    spread = np.std(scores, axis=0)
+    assert np.all((spread > 0.6) & (spread < 1.5)), spread

@@ -178,3 +178,19 @@ def test_a_group_is_linear_only_if_all_of_it_is():
 def test_ties_that_make_no_sense_are_refused(tie, message):
     with pytest.raises(ValueError, match=re.escape(message)):
         free_parameters(half_car(), tie=tie)
+
+
+def test_a_start_is_moved_into_its_bounds_and_ties():
+    law = Bilinear(2600.0, 1200.0)
+    free = free_parameters(law, bounds={"rebound_rate": (1000.0, 2000.0)}, move=True)
+    assert free.values.tolist() == [1980.0, 1200.0]
+    tied = free_parameters(law, tie={"rebound_rate": "compression_rate"}, move=True)
+    assert tied.build(tied.values) == Bilinear(1200.0, 1200.0) or tied.tree.rebound_rate == 1200.0
+    with pytest.raises(ValueError, match="must start strictly between 1000 and 2000"):
+        free_parameters(law, bounds={"rebound_rate": (1000.0, 2000.0)})
+
+
+@pytest.mark.parametrize(("path", "near"), [("rebound_rat", "rebound_rate"), ("terms.5.rate", "rebound_rate")])
+def test_a_path_to_nothing_names_the_nearest(path, near):
+    with pytest.raises(LookupError, match=f"Nothing is at the path '{path}': .*{near}"):
+        get(Bilinear(2600.0, 1200.0), path)

@@ -6,7 +6,7 @@ import pytest
 
 from jaxdamp import dampers
 from jaxdamp._status import Status
-from jaxdamp.dampers import CoulombFriction, Linear, SeriesSpring, Spring
+from jaxdamp.dampers import CoulombFriction, Linear, MonoTube, SeriesSpring, Spring
 from jaxdamp.rig import dynamic_stiffness, respond
 
 
@@ -56,3 +56,9 @@ def test_what_means_nothing_is_refused() -> None:
         dynamic_stiffness(SeriesSpring(Linear(1000.0), 1e5), [1e-3], 0.01)
     with pytest.raises(ValueError, match="amplitude"):
         dynamic_stiffness(Linear(1000.0), FREQUENCY, [0.01, 0.02])
+
+
+@pytest.mark.parametrize(("amplitude", "mean"), [(0.1, 0.0), (0.001, 0.2)])
+def test_strokes_outside_the_limits_are_refused(amplitude, mean):
+    with pytest.raises(ValueError, match=r"`amplitude` must keep the stroke from -0\.57 to 0\.07359 m for MonoTube"):
+        dynamic_stiffness(MonoTube.reference(), [1.0], amplitude, mean=mean)

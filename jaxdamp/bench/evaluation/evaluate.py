@@ -1,5 +1,6 @@
 """`evaluate`: every measurement of records, by setting."""
 
+import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
@@ -90,9 +91,14 @@ def _check_options(velocities: Sequence[float] | None, method: str | None, windo
         _checks.positive("velocities", velocity, "The direction is in the quantity.")
 
 
+_NEXT = 6.0  # largest ratio of neighbouring peak velocities, between which forces are interpolated
+
+
 def _usual_method(settings: Mapping[str, Sequence[BenchRun]]) -> str:
-    """Interpolation where every setting has motions of different peak velocity, the loop elsewhere."""
-    return "interpolation" if all(len(repeats(runs)) > 1 for runs in settings.values()) else "loop"
+    """Interpolation where every setting has several peak velocities, none far from the next; elsewhere the loop."""
+    peaks = [sorted(run.peak_velocity for run in runs) for runs in settings.values()]
+    near = all(after <= _NEXT * before for each in peaks for before, after in itertools.pairwise(each))
+    return "interpolation" if near and all(len(repeats(runs)) > 1 for runs in settings.values()) else "loop"
 
 
 def _of_setting(

@@ -16,6 +16,7 @@ from jaxdamp.bench.motion import Samples
 from jaxdamp.bench.runs import BenchRun
 
 
+_ONE_SPEED, _MOST_OF_THE_TIME = 0.1, 0.6  # relative to the median, of the samples: 0.13 in a sine
 _COLLINEAR = 100.0  # condition number from which friction and damping cannot be told apart
 _BINS = 40  # of the stroke, for the curves
 _CLEAR = 6.0  # standard deviations of the ratio of variances from which the damping is curved
@@ -178,8 +179,7 @@ def _fit(
         (stroke[part] - middle, u, force[part])
         for stroke, force, part, u in zip(cycles.stroke, cycles.force, use, speeds, strict=True)
     ]
-    straight = [_columns(x, u, 1) for x, u, _ in parts]
-    if any(np.linalg.cond(columns / np.linalg.norm(columns, axis=0)) > _COLLINEAR for columns in straight):
+    if _hardly_varies([_columns(x, u, 1) for x, u, _ in parts], speeds):
         mean = high * np.mean([np.abs(u).mean() for u in speeds])
         note = f"The velocity hardly varies: the friction contains the damping at {mean:.3g} m/s."
         return _of_order(parts, 0, high).values, {}, note
@@ -189,6 +189,14 @@ def _fit(
     best = 1 if curve.free > 0 and ratio > 1 + _CLEAR / np.sqrt(len(parts)) else 0
     uncertain = {name: _uncertainty(orders, best, column) for name, column in (("gas force", 0), ("friction", 2))}
     return orders[best].values, uncertain, ""
+
+
+def _hardly_varies(columns: Sequence[Float[np.ndarray, "time terms"]], speeds: Sequence[Samples]) -> bool:
+    """Whether friction and damping look alike; or most of the time is spent near one speed, as in a triangle."""
+    if any(np.linalg.cond(each / np.linalg.norm(each, axis=0)) > _COLLINEAR for each in columns):
+        return True
+    ways = [u[side * u > 0.0] for u in speeds for side in (1.0, -1.0)]
+    return all(np.mean(np.abs(u / np.median(u) - 1.0) < _ONE_SPEED) > _MOST_OF_THE_TIME for u in ways)
 
 
 def _uncertainty(orders: "Sequence[_Fits]", best: int, column: int) -> float:

@@ -213,7 +213,8 @@ def usable(
     if wrong and (bad_records == "refuse" or not sound):
         more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
         error = wrong[0]
-        ways = '`bad_records="leave_out"` fits the others, `bad_records="keep"` fits them as they are.'
+        ways = '`bad_records="leave_out"` fits the others, ' if len(sound) else "No record would be left; "
+        ways += '`bad_records="keep"` fits them as they are.'
         is_ = f"{error.record}{more}: {error.message}"
         _checks.refuse(argument, "be records without errors", is_, f"{error.remedy} {ways}")
     return sound

@@ -17,6 +17,7 @@ _NO_DAMPER = 30.0  # N s/m: less is no damper of a vehicle
 _SMOOTHER = 0.99  # ratio of the relative rates of change of force and stroke
 _LEAST_DELAY = 0.1  # sampling steps
 _HARMONICS = 9
+_ROUNDS = 3  # to turn harmonics back by a delay
 
 
 def sign(e: Examined) -> list[Finding]:
@@ -133,6 +134,9 @@ def _delay(cycles: FoldedCycles, noise: float, orders: "range | tuple[int, ...]"
     if power <= 0.0:
         return 0.0, float("inf")
     each = -(turned.imag @ weight) / power
+    for _ in range(_ROUNDS):  # turned back by what is known of it
+        back = turned * np.exp(1j * number * omega * each[:, None])
+        each = each - (back.imag @ weight) / power
     least = noise * np.sqrt(2.0 / (points * count)) / np.sqrt(power)
     change, drifts = _trend(cycles.starts, cycles.force.mean(axis=1)) if count > 2 else (0.0, False)
     # The ramp of a drift has harmonics of the size ramp / (π k), of which the phase is not known.
