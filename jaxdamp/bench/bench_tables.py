@@ -55,7 +55,7 @@ def without_bad_rows(table: RawTable, columns: Mapping[str, Column]) -> RawTable
     """A table without rows in which a quantity is missing or no number; a note counts them.
 
     Their places, of ten rows one after the other at most, are bridged by straight lines between the rows around them,
-    so that the time goes on.
+    so that the time goes on; before the first good row and after the last one, as in a footer, they are cut off.
 
     Raises:
         ValueError: more bad rows than can be left out, or more of them one after the other.
@@ -69,18 +69,21 @@ def without_bad_rows(table: RawTable, columns: Mapping[str, Column]) -> RawTable
     rows, place = np.arange(len(table)), table.place(int(np.argmax(bad)))
     good = rows[~bad]
     longest, count = int(np.diff(good, prepend=-1, append=len(table)).max()) - 1, int(bad.sum())
-    if longest > _LONGEST_BRIDGE or bad.mean() > _MOST_BAD or bad[0] or bad[-1]:
-        limits = f"at most {_LONGEST_BRIDGE} in a row inside the record, and {100 * _MOST_BAD:g} % of all"
+    if longest > _LONGEST_BRIDGE or bad.mean() > _MOST_BAD:
+        limits = f"at most {_LONGEST_BRIDGE} in a row, and {100 * _MOST_BAD:g} % of all"
         raise ValueError(
             f"{table.where}: {count} of {len(table)} rows are bad, up to {longest} one after the other, the first is "
             f"{place}; {limits}, can be left out. Cut the record there."
         )
-    channels = list(table.columns)
+    inside = slice(good[0], good[-1] + 1)
+    channels = [replace(column, values=column.values[inside]) for column in table.columns]
     for index in used:
-        values = np.interp(rows, good, np.asarray(channels[index].values, np.float64)[~bad])
+        values = np.interp(rows[inside], good, np.asarray(table.columns[index].values, np.float64)[~bad])
         channels[index] = replace(channels[index], values=values, faults={})
-    note = f"{count} bad row{'s' * (count > 1)} left out, straight lines instead; the first is {place}"
-    return replace(table, columns=tuple(channels), notes=(*table.notes, note))
+    bridged = ", straight lines instead" * bool(bad[inside].any())
+    note = f"{count} bad row{'s' * (count > 1)} left out{bridged}; the first is {place}"
+    lines = table.lines[inside] if len(table.lines) else table.lines
+    return replace(table, columns=tuple(channels), lines=lines, notes=(*table.notes, note))
 
 
 def _channels(table: RawTable, columns: Mapping[str, Column], choice: Choice) -> tuple[dict[str, Samples], list[str]]:

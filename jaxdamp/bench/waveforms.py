@@ -163,8 +163,7 @@ class TriangleTest(Ramped):
         amplitude: a [m], zero to peak.
         frequency: f [Hz].
         cycles: recorded cycles.
-        sharpness: k, between 0 (a sine) and 1 (corners, where the velocity jumps). Turns much sharper than the default
-            hold frequencies above ten times f, which `estimate_velocity` takes for noise.
+        sharpness: k, between 0 (a sine) and 1 (corners, where the velocity jumps, and `estimate_velocity` overshoots).
         warm_up_cycles: cycles before the record, over half of which the amplitude grows.
         name: of the record; made of amplitude and frequency if left out.
 

@@ -48,6 +48,12 @@ def test_bad_rows_are_left_out_on_request_and_counted(tmp_path):
     assert np.allclose(run.force, 500 * np.cos(9 * run.time), atol=3.0)
 
 
+def test_bad_rows_behind_the_last_good_one_are_cut_off(tmp_path):
+    (tmp_path / "a.csv").write_text("\n".join(["t_s,x_mm,F_N", *ROWS, "max,20.0,500.0", "min,-20.0,-500.0"]))
+    (run,) = bench.read(tmp_path / "a.csv", drop_bad_rows=True)
+    assert len(run) == 400 and "2 bad rows left out; the first is line 402" in run.notes
+
+
 def test_a_hole_in_a_record_is_no_bad_row(tmp_path):
     rows = [row if not 100 <= at < 115 else f"{TIME[at]:.4f},1,?" for at, row in enumerate(ROWS)]
     (tmp_path / "a.csv").write_text("\n".join(["t_s,x_mm,F_N", *rows]))

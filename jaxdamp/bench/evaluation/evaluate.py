@@ -39,7 +39,8 @@ def evaluate(
             the largest that the records of all settings reach, if they reach none of these.
         method: "interpolation" between the peak forces of records; "window": of the records whose peak velocity is
             within `window` of the stated one; "loop": on the continuous loop of the fastest record. Interpolation
-            where every setting has two records or more of different peak velocity, the loop elsewhere, if left out.
+            where every setting has two records or more of different peak velocity, each at most six times the last, the
+            loop elsewhere, if left out.
         window: share of the stated velocity.
         by: gives the setting of a record; its command, if left out. Where records without a command contradict one
             another again and again, they are told apart by what they state or by their names, or not pooled at all,
