@@ -177,7 +177,7 @@ def law_source(program: LawProgram, name: str, derivatives: Sequence[str] = ()) 
     states, c = f"{name.upper()}_STATES", Functions(name, program.dtype)
     step = "The states after a step dt [s] over which the motion goes from (x0, v0) to (x1, v1)."
     functions = [
-        c("init p > state", program.initial_state, "The states at rest at stroke zero."),
+        c("init p x > state", program.initial_state, "The states at rest at stroke x."),
         c("force p x v *state", program.force, "The force."),
         c("advance p x0 v0 x1 v1 dt > state", program.advance, step),
         c("state_rate p x v *state > rate", program.state_rate, "The time derivative of the states [1/s]."),

@@ -136,8 +136,8 @@ class LawProgram(AbstractProgram):
 
     @cached_property
     def initial_state(self) -> Program:
-        """`initial_state(p)`: at rest at stroke zero."""
-        return lower(lambda values: self.law_of(values).state_at_rest(jnp.zeros((), self.dtype)), self.values())
+        """`initial_state(p, x)`: the states at rest."""
+        return lower(lambda values, x: self.law_of(values).state_at_rest(x), self.values(), self._symbols("x"))
 
     @cached_property
     def force_derivative(self) -> Program:

@@ -52,7 +52,7 @@ def sample_motion(law: AbstractDamper, step: float = _STEP) -> tuple[np.ndarray,
 def law_test(program: LawProgram, name: str) -> str:
     """The text of the program for a law; it returns zero if the greatest difference is due to rounding."""
     time, stroke, velocity = sample_motion(program.law)
-    computed = respond(program.law, time, stroke, velocity, state=program.law.state_at_rest(0.0))
+    computed = respond(program.law, time, stroke, velocity, state=program.law.state_at_rest(stroke[0]))
     arrays = {"x": stroke, "v": velocity, "expected": np.asarray(computed, float)}
     real, close = LANGUAGE.types[program.dtype], _tolerance(program.dtype, computed.dtype)
     return f"""{_begin(name, "forces", arrays)}
@@ -62,7 +62,7 @@ int main(void) {{
     double worst = 0.0, greatest = 0.0;
     int i;
     {name}_defaults(&p);
-    {name}_init(&p, state);
+    {name}_init(&p, ({real})x[0], state);
     for (i = 0; i < {_INSTANTS}; ++i) {{
         double error;
         if (i > 0) {{
@@ -200,9 +200,9 @@ def to_c(
     real time. A struct holds the parameters and settings, with units and allowed values as comments; `NAME_defaults`
     sets those of this law or vehicle.
 
-    Of a law, `NAME_init` gives the states at rest, `NAME_force` the force, `NAME_advance` the states after a step, as
-    the methods of the law do, and `NAME_state_rate` their rate for solvers of differential equations. The test program
-    repeats a motion and compares the forces with those computed here.
+    Of a law, `NAME_init` gives the states at rest at a stroke, `NAME_force` the force, `NAME_advance` the states after
+    a step, as the methods of the law do, and `NAME_state_rate` their rate for solvers of differential equations. The
+    test program repeats a motion and compares the forces with those computed here.
 
     Of a vehicle, `NAME_prepare` computes what follows from the parameters and the step, `NAME_start` the static
     equilibrium on the road, `NAME_step` a step of `simulate` with the exponential engine, `NAME_outputs` the channels

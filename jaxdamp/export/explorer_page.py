@@ -36,9 +36,9 @@ _LANGUAGE = JavaScript()
 
 
 def law_functions(law: LawProgram) -> dict[str, str]:
-    """`initial(p, state)`, `force(p, x, v, state)`, `advance(p, ..., dt, state)`, `margins(p, y)`, by names."""
+    """`initial(p, x, state)`, `force(p, x, v, state)`, `advance(p, ..., dt, state)`, `margins(p, y)`, by names."""
     return {
-        "initial": _filled("initial(p, state)", law.initial_state, "state"),
+        "initial": _filled("initial(p, x, state)", law.initial_state, "state"),
         "force": _returned("force(p, x, v, state)", law.force),
         "advance": _filled("advance(p, x0, v0, x1, v1, dt, state)", law.advance, "state"),
         "margins": _filled("margins(p, y)", law.margins, "y"),

@@ -52,7 +52,7 @@ void run_{name}(const double *x, const double *v, double *states, double *forces
     double state[{states + 1}], dstate[{states + 1}];
     {name}_defaults(&p);
     {name}_defaults(&dp);
-    {name}_init(&p, state);
+    {name}_init(&p, x[0], state);
     for (k = 0; k < size; ++k) states[k] = state[k];
     for (i = 1; i < n; ++i) {{
         for (k = 0; k < size; ++k) dstate[k] = 0.3 * state[k];

@@ -285,3 +285,13 @@ def test_compilers_that_are_missing_or_fail(tmp_path):
         to_fmu(LAWS["series"], tmp_path / "law.fmu", compiler="false")
     with pytest.raises(ValueError, match=r"NAME\.fmu .*Try 'front_left\.fmu'"):
         to_fmu(LAWS["series"], tmp_path / "front-left.zip")
+
+
+def test_a_unit_begins_at_rest_at_its_first_stroke(tmp_path):
+    law = Lag(PiecewiseLinear([-0.1, 0.1], [700.0, 2000.0, 900.0]) + Spring(3000.0, -50.0), 0.004)
+    file = to_fmu(law, tmp_path / "begun.fmu")
+    time = np.arange(11) * 1e-3
+    still = np.zeros(11, dtype=[("time", float), ("x", float), ("v", float)])
+    still["time"], still["x"] = time, 0.02
+    result = fmpy.simulate_fmu(str(file), stop_time=0.01, output_interval=1e-3, input=still, fmi_type="CoSimulation")
+    np.testing.assert_allclose(result["F"], 10.0, rtol=1e-9)  # 3000 N/m times 20 mm, and the preload

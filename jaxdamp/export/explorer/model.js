@@ -10,7 +10,7 @@ function unpacked(text) {
 // Forces [N] over a motion {dt, x, v}, the law at rest before it, as jaxdamp.respond computes them.
 function respond(program, states, p, motion) {
   const { dt, x, v } = motion, force = new Float64Array(x.length), state = new Float64Array(states + 1);
-  program.initial(p, state);
+  program.initial(p, x[0], state);
   force[0] = program.force(p, x[0], v[0], state);
   for (let i = 1; i < x.length; ++i) {
     if (states) program.advance(p, x[i - 1], v[i - 1], x[i], v[i], dt, state);

@@ -11,8 +11,8 @@
 static void prepare(const model_parameters *p, double h, double *m) { UNUSED(p), UNUSED(h), UNUSED(m); }
 
 static void start(const model_parameters *p, const double *m, const double *u, double *c) {
-    UNUSED(m), UNUSED(u);
-    model_init(p, c);
+    UNUSED(m);
+    model_init(p, u[0], c);
 }
 
 static void resume(const double *m, const double *u, double ratio, double *c) {
