@@ -120,11 +120,7 @@ def levels_differ(problem: Problem, parts: Sequence[Float[np.ndarray, " _"]]) ->
     parts = [part for part in parts if part.any()]
     if len(parts) < 2 or problem.noise_factor != 1.0:
         return False
-    counts, squares = (
-        np.array([(part.size, part @ part) for part in parts if part.size > 1 and part.any()]).reshape(-1, 2).T
-    )
-    if counts.size < 2:
-        return False
+    counts, squares = np.array([(part.size, part @ part) for part in parts]).T
     statistic = counts.sum() * np.log(squares.sum() / counts.sum()) - counts @ np.log(squares / counts)
     return bool(statistic > scipy.special.chdtri(counts.size - 1, BY_CHANCE))
 
