@@ -9,7 +9,7 @@ A difference of neighbouring samples multiplies noise of σ metres by √2 times
   expected error, judged by the spectrum of the record: what is above the noise within ten times the frequency of the
   motion is motion. So is what is faster, as on roads, if it is one percent of the stroke or more, and 0.3 % at the
   multiples of this frequency, as in the corners of triangles. Less is ripple, as is what lies at multiples of 50 and
-  60 Hz.
+  60 Hz, and all that is fast in a stroke that jumps.
 """
 
 import numpy as np
@@ -37,6 +37,7 @@ _LAST_SHARE = 0.005  # of the highest harmonics in the velocity, relative to the
 _SLOW = 10.0  # times the frequency of the motion
 _FAST_SHARE, _REPEATED_SHARE = 0.01, 0.003  # of the stroke, above which what is faster is motion
 _MAINS = (50.0, 60.0)  # Hz
+_JUMP = 6.0  # a step from sample to sample, relative to the RMS of all
 _SAID = 0.02  # of the velocity, above which ripple that is left out is named
 _QUIET = 0.03  # residual, relative to the amplitude, that is taken for ripple and noise of any colour
 
@@ -221,6 +222,7 @@ def _window(stroke: Samples, rate: float, frequency: float) -> tuple[int, int, f
     seen, slow = spectrum > 10 * floor, omega < 2 * np.pi * _SLOW * frequency / rate
     frequencies = omega * rate / (2 * np.pi)
     fast = seen & ~slow & ~np.any([_near_multiples(frequencies, mains) for mains in _MAINS], axis=0)
+    fast &= not _jumps(stroke)
     for part, share in ((fast, _FAST_SHARE), (fast & _near_multiples(frequencies, frequency), _REPEATED_SHARE)):
         if np.sum(spectrum[part]) > share**2 * np.sum(spectrum[seen]):
             slow |= part
@@ -236,6 +238,14 @@ def _window(stroke: Samples, rate: float, frequency: float) -> tuple[int, int, f
             best = min(best, (error, 2 * half + 1, order))
             half = max(half + 1, round(1.2 * half))
     return best[1], best[2], float(ripple)
+
+
+def _jumps(stroke: Samples) -> bool:
+    """Whether the stroke jumps from one sample to the next, as where samples were lost: no motion does."""
+    steps = np.abs(np.diff(stroke))
+    largest = int(np.argmax(steps))
+    turn = np.max(np.abs(np.diff(stroke[max(largest - 1, 0) : largest + 3], 2)), initial=0.0)
+    return bool(steps[largest] > _JUMP * np.sqrt(np.mean(steps**2)) and turn > 0.5 * steps[largest])
 
 
 def _near_multiples(frequencies: Float[np.ndarray, " lines"], base: float) -> Bool[np.ndarray, " lines"]:
