@@ -115,7 +115,7 @@ class _Keyed:
 def _settled(question: _Keyed) -> QuasiStatic:
     """The curve, which a table, a picture and a page ask for one after the other."""
     law, velocities, stroke = question.content
-    begin = np.asarray(law.state_at_rest(jnp.asarray(stroke, velocities.dtype)))
+    begin = np.asarray(law.initial_state())
     states = on_device(np.broadcast_to(begin, (velocities.size, begin.size)).copy())
     states, force = _hold(law, stroke, velocities, states, jnp.asarray(0))
     if begin.size == 0:

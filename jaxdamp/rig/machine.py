@@ -13,7 +13,7 @@ from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._types import Number, Scalar, Signal, SignalLike, State
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import AbstractDeclared, Domain, as_float, nonnegative, parameter, positive, setting
-from jaxdamp.rig.marching import NOTHING, Followed, finer, march, slopes, step_and_rate
+from jaxdamp.rig.marching import NOTHING, Followed, finer, march, slopes, state_at_rest, step_and_rate
 from jaxdamp.rig.response import respond
 from jaxdamp.rig.sensor import delayed, delayed_straight, lagged
 
@@ -169,7 +169,7 @@ class Rig(AbstractDeclared):
             time, substeps = time[0] + dt * jnp.arange(motion[0].size, dtype=time.dtype), 1
         warm, acting = acting.temperature, acting.of(law)  # for the machine and for the law
         inside = motion[0] - self.stroke_offset
-        start = acting.first(law).state_at_rest(inside[0])
+        start = state_at_rest(acting.first(law), inside[0])
         law_force = respond(law, time, inside, motion[1], state=start, **acting._asdict(), substeps=substeps)
         shown = _readings(self, self.effects(), law_force, dt, *motion, warm).every(parts)
         return shown if temperature is None else shown._replace(temperature=temperature)

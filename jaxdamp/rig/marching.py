@@ -113,6 +113,12 @@ def march(
 
 
 @compiled_for_loops
+def state_at_rest(law: AbstractDamper, stroke: Array) -> State:
+    """The states of a law at rest at a stroke [m], by one program."""
+    return law.state_at_rest(stroke)
+
+
+@compiled_for_loops
 def march_states(
     law: AbstractDamper,
     dt: Array,

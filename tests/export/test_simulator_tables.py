@@ -119,7 +119,7 @@ def test_assetto_corsa_finds_the_knee_and_states_the_misfit(tmp_path):
 
 @pytest.mark.slow
 def test_assetto_corsa_says_of_a_law_that_never_settles_why_velocities_are_missing(tmp_path):
-    with pytest.raises(ValueError, match=r"in compression, but is .* No force at 36 of 37 velocities"):
+    with pytest.raises(ValueError, match=r"a force at constant velocity, but is .* No force at 36 of 37 velocities"):
         to_assetto_corsa(ModifiedBoucWen.prototype(1.5), tmp_path / "front.ini", VELOCITIES)
 
 
