@@ -213,7 +213,7 @@ def _in_cycles(t: Samples, residual: Samples, omega: float) -> tuple[Float[np.nd
 def _window(stroke: Samples, rate: float, frequency: float) -> tuple[int, int, float]:
     """Length and order of the Savitzky-Golay filter with the least expected error of the velocity.
 
-    The third number is the share of ripple that is above the noise in the RMS velocity.
+    The third number is the ripple above the noise that it leaves out, relative to the RMS velocity.
     """
     count = len(stroke)
     spectrum = np.abs(np.fft.rfft((stroke - np.mean(stroke)) * np.hanning(count))) ** 2
@@ -226,8 +226,7 @@ def _window(stroke: Samples, rate: float, frequency: float) -> tuple[int, int, f
     for part, share in ((fast, _FAST_SHARE), (fast & _near_multiples(frequencies, frequency), _REPEATED_SHARE)):
         if np.sum(spectrum[part]) > share**2 * np.sum(spectrum[seen]):
             slow |= part
-    motion, of_velocity = np.where(seen & slow, spectrum - floor, 0.0), omega**2 * (spectrum - floor)
-    ripple = np.sqrt(np.sum(of_velocity[seen & ~slow]) / max(np.sum(of_velocity[seen]), np.finfo(float).tiny))
+    motion = np.where(seen & slow, spectrum - floor, 0.0)
     longest = min(max(rate / frequency, 5), count - 1)
     best = (np.inf, 5, 3)
     for order in (3, 5):
@@ -237,7 +236,9 @@ def _window(stroke: Samples, rate: float, frequency: float) -> tuple[int, int, f
             error = float(np.sum(motion * (response - omega) ** 2 + (spectrum - motion) * response**2))
             best = min(best, (error, 2 * half + 1, order))
             half = max(half + 1, round(1.2 * half))
-    return best[1], best[2], float(ripple)
+    left = np.where(seen & ~slow, omega - _response(best[1] // 2, best[2], omega), 0.0)
+    of_velocity = np.sum(np.where(seen, omega**2 * spectrum, 0.0))
+    return best[1], best[2], float(np.sqrt(np.sum(left**2 * spectrum) / max(of_velocity, np.finfo(float).tiny)))
 
 
 def _jumps(stroke: Samples) -> bool:

@@ -174,7 +174,7 @@ def test_fast_motion_is_no_noise(motion, noise, rng):
     assert np.std(velocity - v) < 0.02 * np.std(v)
 
 
-def test_ripple_of_the_mains_is_left_out_and_named(rng):
+def test_ripple_of_the_mains_is_left_out_and_named():
     t = np.arange(20000) / 1000
     grown = 0.002 * (1.0 + 0.1 * t / 20) * np.sin(2 * np.pi * 0.2 * t)
     velocity, how = estimate_velocity(t, grown + 1e-5 * np.sin(2 * np.pi * 50 * t))

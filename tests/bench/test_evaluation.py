@@ -348,34 +348,3 @@ def test_measured_records_by_current(data):
     found = evaluate(read(sorted((data / "mr_damper").glob("*.csv")), sign="rebound-positive", command=commands))
     friction = [found.get("friction", setting=setting).value for setting in ("0", "0.5", "1")]
     assert friction == sorted(friction) and 100.0 < friction[0] < 200.0 and friction[2] > 900.0
-
-
-def test_a_slow_record_does_not_draw_a_straight_line_to_a_fast_one():
-    fast, slow = sine(0.02, 3.0, kneed), sine(0.02, 0.3, kneed)
-    alone, both = evaluate(fast), evaluate([slow, fast])
-    assert both.method == "loop"
-    expected = alone.get("rebound force", velocity=0.131).value
-    assert both.get("rebound force", velocity=0.131).value == pytest.approx(expected, rel=1e-3)
-
-
-def test_friction_of_a_triangle_contains_its_damping_and_says_so():
-    """Also where the velocity comes from the stroke, whose turns then look like slow motion."""
-    t = np.arange(4000) / 500
-    inner = (1.0 - 1e-3) * np.sin(np.pi * t)
-    stroke, way = 0.02 * 2 / np.pi * np.arcsin(inner), np.sign(np.cos(np.pi * t))
-    run = BenchRun.from_arrays("triangle", t, stroke, 2000.0 * 0.04 * way + 40.0 * way - 150.0)
-    assert "The velocity hardly varies: the friction contains the damping" in separate_gas_and_friction(run).note
-
-
-@pytest.mark.parametrize("phase", [0.0, 1.0, np.pi / 2, np.pi])
-@pytest.mark.parametrize("count", [500, 501])
-def test_a_record_of_one_cycle_is_a_cycle(phase, count):
-    """As the mean cycles that bench software exports, with the first sample once more or without."""
-    time = np.arange(count) / 1000
-    angle = 4 * np.pi * time + phase
-    velocity = 0.02 * 4 * np.pi * np.cos(angle)
-    force = np.where(velocity > 0, REBOUND, COMPRESSION) * velocity
-    run = BenchRun.from_arrays("mean", time, 0.02 * np.sin(angle), force)
-    assert run.frequency == pytest.approx(2.0, rel=3e-3) and run.cycles == 1
-    energy = np.pi * 4 * np.pi * 0.02**2 * (REBOUND + COMPRESSION) / 2
-    assert evaluate(run).get("energy per cycle").value == pytest.approx(energy, rel=1e-2)

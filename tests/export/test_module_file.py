@@ -343,9 +343,3 @@ def test_classes_of_the_package_have_names_of_their_own():
     for own in modules:
         homes.setdefault(own.__name__, set()).add(own.__module__)
     assert not {name: places for name, places in homes.items() if len(places) > 1 and not name.startswith("_")}
-
-
-def test_a_folder_is_no_file(tmp_path):
-    for call in (lambda: to_json(Linear(2.0), tmp_path), lambda: from_json(tmp_path)):
-        with pytest.raises(ValueError, match=r"must be a file, but is the folder .* Add the name of the file"):
-            call()

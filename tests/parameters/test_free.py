@@ -185,7 +185,7 @@ def test_a_start_is_moved_into_its_bounds_and_ties():
     free = free_parameters(law, bounds={"rebound_rate": (1000.0, 2000.0)}, move=True)
     assert free.values.tolist() == [1980.0, 1200.0]
     tied = free_parameters(law, tie={"rebound_rate": "compression_rate"}, move=True)
-    assert tied.build(tied.values) == Bilinear(1200.0, 1200.0) or tied.tree.rebound_rate == 1200.0
+    assert tied.names == ["compression_rate"] and float(tied.tree.rebound_rate) == 1200.0
     with pytest.raises(ValueError, match="must start strictly between 1000 and 2000"):
         free_parameters(law, bounds={"rebound_rate": (1000.0, 2000.0)})
 
