@@ -132,6 +132,15 @@ def test_what_the_machine_adds_is_fitted_and_shown(records: Path, tmp_path: Path
     assert "Option --rig must be one of" in message and "Did you mean 'delay'" in message
 
 
+def test_a_cross_validation_is_of_the_same_fit(records: Path, tmp_path: Path) -> None:
+    """Whose bounds need not contain the start that the command computes."""
+    words = ["--law", "bilinear", "--bound", "rebound_rate=1000:2000", "--cross-validate", "--out", tmp_path / "fit"]
+    text = jaxdamp("fit", records, *words).output
+    left_out = text.partition("Errors of the held-out records")[2].splitlines()
+    errors = [float(line.split()[-1]) for line in left_out if line.strip().startswith("bilinear")]
+    assert len(errors) == 3 and min(errors) > 5.0  # without the bound it is the noise, 2 N
+
+
 def test_one_law_is_fitted_without_a_ladder(records: Path, tmp_path: Path) -> None:
     text = " ".join(jaxdamp("fit", records, "--law", "linear", "--out", tmp_path / "fit").output.split())
     assert "Fitting 1 law to 3 records ... - linear: RMSE " in text and "Records (" not in text  # by --verbose
