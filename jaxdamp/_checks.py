@@ -173,13 +173,13 @@ def nonnegative(argument: str, value: object, remedy: str = "") -> None:
 
 def described(value: Any) -> str:
     """A value in a few words, with its type: "the text 'linear'", "the number 1500.0", "a HalfCar"."""
-    if value is None:
-        return "None"
+    if value is None or isinstance(value, bool):
+        return str(value)
     if isinstance(value, type):
         return f"the class {value.__name__}"
     if isinstance(value, str):
         return f"the text {value!r}"
-    if isinstance(value, bool | int | float | complex | np.number):
+    if isinstance(value, int | float | complex | np.number):
         return f"the number {value}"
     name = type(value).__name__
     name = "array" if isinstance(value, np.ndarray) or hasattr(value, "aval") else name

@@ -37,12 +37,15 @@ def triangle(tall: PyTree) -> PyTree:
 
 def _by_products(tall: Float[np.ndarray, "rows columns"]) -> Float[np.ndarray, "columns columns"] | None:
     """The triangle by Cholesky; None where the rounding of the products would be seen."""
+    if tall.dtype != np.float64 or len(tall) < 2 * tall.shape[1]:
+        return None
     products = tall.T @ tall
     norms = np.sqrt(np.diagonal(products))
-    if tall.dtype != np.float64 or len(tall) < 2 * norms.size or not (norms > 0.0).all():
-        return None
+    lengths = np.where(norms > 0.0, norms, 1.0)
+    unit = products / lengths / lengths[:, None]
+    np.fill_diagonal(unit, 1.0)  # columns of zeros, as of knots that a record does not reach, are zeros of R too
     try:
-        unit = np.linalg.cholesky(products / norms / norms[:, None])
+        unit = np.linalg.cholesky(unit)
     except np.linalg.LinAlgError:
         return None
     return unit.T * norms if np.diagonal(unit).min() > _INDEPENDENT else None

@@ -21,7 +21,17 @@ Structure: TypeAlias = dict[str, Untyped]  # arrays, numbers, texts, lists and s
 def read_mat(file: Path) -> list[RawTable]:
     """Read a MATLAB file, v5 to v7.3: vectors side by side, in the file or in a structure, are a record."""
     content = library("pymatreader", file).read_mat(file)
-    return alone(list(_structures(file, "", {k: v for k, v in content.items() if not k.startswith("__")}, {})))
+    fields = {k: v for k, v in content.items() if not k.startswith("__")}
+    with file.open("rb") as opened:
+        ordered = _in_order(fields) if b"MATLAB 7.3" in opened.read(128) else fields
+    return alone(list(_structures(file, "", ordered, {})))
+
+
+def _in_order(content: Untyped) -> Untyped:
+    """Fields by name, as HDF5 lists them: the library gives them in another order each time."""
+    if isinstance(content, list):
+        return [_in_order(item) for item in content]
+    return {key: _in_order(content[key]) for key in sorted(content)} if isinstance(content, dict) else content
 
 
 def _structures(file: Path, name: str, fields: Structure, units: Mapping[str, Untyped]) -> Iterator[RawTable]:
@@ -102,7 +112,7 @@ def _scaled(where: str, values: np.ndarray, fields: Structure) -> tuple[np.ndarr
     """The samples of a channel by the scale and offset beside them, if they are counts, and a note.
 
     Raises:
-        ValueError: several fields that could be the scale.
+        ValueError: several fields that could be the scale, or one of several numbers.
     """
     factors, offsets = _scalars(fields, _FACTORS), _scalars(fields, _OFFSETS)
     names = ", ".join((*factors, *offsets))
@@ -120,9 +130,11 @@ def _scaled(where: str, values: np.ndarray, fields: Structure) -> tuple[np.ndarr
 
 
 def _scalars(fields: Structure, keys: Sequence[str]) -> dict[str, float]:
-    """The fields of these names, in any case, that are one number."""
+    """The fields of these names, in any case, that are one number, or several."""
     found = {key: value for key, value in fields.items() if key.lower() in keys}
-    return {key: float(value) for key, value in found.items() if isinstance(value, int | float)}
+    several = {key: value.ravel() for key, value in found.items() if _is_samples(value) and key.lower() not in _DATA}
+    lists = {f"{key}[{i}]": float(one) for key, value in several.items() for i, one in enumerate(value)}
+    return {key: float(value) for key, value in found.items() if isinstance(value, int | float)} | lists
 
 
 def _named(fields: Structure, value: Untyped) -> list[RawColumn]:

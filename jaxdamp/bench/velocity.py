@@ -6,14 +6,11 @@ A difference of neighbouring samples multiplies noise of σ metres by √2 times
 * harmonic regression: a steady sine of a test bench is a few harmonics of one frequency. Frequency and harmonics are
   fitted to the whole record and differentiated exactly; noise, mains ripple and quantisation average out.
 * Savitzky-Golay: the slope of a cubic or quintic fitted around every sample. The window is the one with the least
-  expected error, judged by the spectrum of the record: what is above the noise within ten times the frequency of the
-  motion is motion. So is what is faster, as on roads, if it is one percent of the stroke or more, and 0.3 % at the
-  multiples of this frequency, as in the corners of triangles. Less is ripple, as is what lies at multiples of 50 and
-  60 Hz, and all that is fast in a stroke that jumps.
+  expected error, judged by what in the spectrum of the record is motion (see `jaxdamp.bench.spectrum`).
 """
 
 import numpy as np
-from jaxtyping import ArrayLike, Bool, Float
+from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
@@ -26,6 +23,7 @@ from jaxdamp.bench.motion import (
     savitzky_golay,
     savitzky_golay_weights,
 )
+from jaxdamp.bench.spectrum import Spectrum, spectrum_of
 
 
 METHODS = ("harmonic", "savitzky-golay")
@@ -34,11 +32,6 @@ _STEADY = 0.004  # amplitude by which a cycle may differ from the mean cycle
 _UNSTEADY = 0.5  # the same, beyond which a look at some of the samples is enough
 _ENOUGH, _A_CYCLE = 20_000, 20  # samples, in all and in a cycle, of such a look
 _LAST_SHARE = 0.005  # of the highest harmonics in the velocity, relative to the fundamental
-_SLOW = 10.0  # times the frequency of the motion
-_FAST_SHARE, _REPEATED_SHARE = 0.01, 0.003  # of the stroke, above which what is faster is motion
-_MAINS = (50.0, 60.0)  # Hz
-_JUMP = 6.0  # a step from sample to sample, relative to the RMS of all
-_SAID = 0.02  # of the velocity, above which ripple that is left out is named
 _QUIET = 0.03  # residual, relative to the amplitude, that is taken for ripple and noise of any colour
 
 
@@ -80,12 +73,14 @@ def estimate_velocity(time: ArrayLike, stroke: ArrayLike, *, method: str | None 
     clock.check_stroke(stroke, "the record")
     time, _ = clock.check_time(time, "the record")
     frequency = dominant_frequency(time, stroke)
+    spectrum = spectrum_of(time, stroke, frequency)
     if method != "savitzky-golay":
-        fit = _fit_harmonics(time, stroke, frequency)
+        fit = None if spectrum.has_fast_motion else _fit_harmonics(time, stroke, frequency)
         if fit is not None:
             velocity, omega, count = fit
             wave = f"{omega / (2 * np.pi):.5g} Hz, {count} harmonic{'s' * (count > 1)}"
-            return velocity, f"velocity from the stroke by harmonic regression, {wave}"
+            left = spectrum.left_out(spectrum.omega < 1.5 * count * omega / spectrum.rate)
+            return velocity, f"velocity from the stroke by harmonic regression, {wave}{left}"
         if method == "harmonic":
             _checks.refuse(
                 "method",
@@ -93,12 +88,11 @@ def estimate_velocity(time: ArrayLike, stroke: ArrayLike, *, method: str | None 
                 "'harmonic' for a stroke that is no steady periodic motion of two cycles or more",
                 "Cut rest and run-up away, or use 'savitzky-golay'.",
             )
-    rate = (len(time) - 1) / (time[-1] - time[0])
-    window, order, ripple = _window(stroke, rate, frequency)
-    velocity = rate * savitzky_golay(stroke, window, order, derivative=1)
-    width = f"{window} samples ({1e3 * (window - 1) / rate:.3g} ms)"
-    left = f", without ripple above {_SLOW * frequency:.3g} Hz of {100 * ripple:.2g} % of it" * (ripple > _SAID)
-    return velocity, f"velocity from the stroke by a Savitzky-Golay filter of {width}, order {order}{left}"
+    window, order, gain = _window(spectrum, frequency)
+    velocity = spectrum.rate * savitzky_golay(stroke, window, order, derivative=1)
+    width = f"{window} samples ({1e3 * (window - 1) / spectrum.rate:.3g} ms)"
+    how = f"velocity from the stroke by a Savitzky-Golay filter of {width}, order {order}"
+    return velocity, how + spectrum.left_out(gain / np.maximum(spectrum.omega, np.finfo(float).tiny))
 
 
 def _basis(phase: Samples, harmonics: int) -> Float[np.ndarray, "time columns"]:
@@ -210,49 +204,20 @@ def _in_cycles(t: Samples, residual: Samples, omega: float) -> tuple[Float[np.nd
     return (2 * np.hypot(cosine, sine) / np.maximum(count, 1))[full], int(count.max())
 
 
-def _window(stroke: Samples, rate: float, frequency: float) -> tuple[int, int, float]:
-    """Length and order of the Savitzky-Golay filter with the least expected error of the velocity.
-
-    The third number is the ripple above the noise that it leaves out, relative to the RMS velocity.
-    """
-    count = len(stroke)
-    spectrum = np.abs(np.fft.rfft((stroke - np.mean(stroke)) * np.hanning(count))) ** 2
-    omega = 2 * np.pi * np.fft.rfftfreq(count)  # per sample
-    floor = float(np.median(spectrum[len(spectrum) // 2 :])) / np.log(2)
-    seen, slow = spectrum > 10 * floor, omega < 2 * np.pi * _SLOW * frequency / rate
-    frequencies = omega * rate / (2 * np.pi)
-    fast = seen & ~slow & ~np.any([_near_multiples(frequencies, mains) for mains in _MAINS], axis=0)
-    fast &= not _jumps(stroke)
-    for part, share in ((fast, _FAST_SHARE), (fast & _near_multiples(frequencies, frequency), _REPEATED_SHARE)):
-        if np.sum(spectrum[part]) > share**2 * np.sum(spectrum[seen]):
-            slow |= part
-    motion = np.where(seen & slow, spectrum - floor, 0.0)
-    longest = min(max(rate / frequency, 5), count - 1)
+def _window(spectrum: Spectrum, frequency: float) -> tuple[int, int, Float[np.ndarray, " lines"]]:
+    """Length and order of the Savitzky-Golay filter with the least expected error of the velocity, and its gain."""
+    power, omega = spectrum.power, spectrum.omega
+    motion = np.where(spectrum.motion, power - spectrum.floor, 0.0)
+    longest = min(max(spectrum.rate / frequency, 5), 2 * (len(power) - 1) - 1)
     best = (np.inf, 5, 3)
     for order in (3, 5):
         half = order // 2 + 1
         while 2 * half + 1 <= longest or half == order // 2 + 1:
             response = _response(half, order, omega)
-            error = float(np.sum(motion * (response - omega) ** 2 + (spectrum - motion) * response**2))
+            error = float(np.sum(motion * (response - omega) ** 2 + (power - motion) * response**2))
             best = min(best, (error, 2 * half + 1, order))
             half = max(half + 1, round(1.2 * half))
-    left = np.where(seen & ~slow, omega - _response(best[1] // 2, best[2], omega), 0.0)
-    of_velocity = np.sum(np.where(seen, omega**2 * spectrum, 0.0))
-    return best[1], best[2], float(np.sqrt(np.sum(left**2 * spectrum) / max(of_velocity, np.finfo(float).tiny)))
-
-
-def _jumps(stroke: Samples) -> bool:
-    """Whether the stroke jumps from one sample to the next, as where samples were lost: no motion does."""
-    steps = np.abs(np.diff(stroke))
-    largest = int(np.argmax(steps))
-    turn = np.max(np.abs(np.diff(stroke[max(largest - 1, 0) : largest + 3], 2)), initial=0.0)
-    return bool(steps[largest] > _JUMP * np.sqrt(np.mean(steps**2)) and turn > 0.5 * steps[largest])
-
-
-def _near_multiples(frequencies: Float[np.ndarray, " lines"], base: float) -> Bool[np.ndarray, " lines"]:
-    """Which lines are within three of a multiple of a frequency [Hz]."""
-    width = 3 * (frequencies[1] - frequencies[0])
-    return np.abs((frequencies + 0.5 * base) % base - 0.5 * base) <= width
+    return best[1], best[2], _response(best[1] // 2, best[2], omega)
 
 
 def _response(half: int, order: int, omega: Float[np.ndarray, " lines"]) -> Float[np.ndarray, " lines"]:

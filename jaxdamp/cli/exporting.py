@@ -1,6 +1,5 @@
 """`jaxdamp export`: a law or a vehicle as C, FMU or the table of a simulator; `jaxdamp explore`: as a page."""
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -87,7 +86,7 @@ def export_command(
             if given is not None:
                 _checks.refuse(name, f"be left out for {to}", given, "Its reader wants units and sign as they are.")
     ending, write = (PROGRAMS | TABLES)[to]
-    name = re.sub(r"^(?=\d)|\W", "_", law.stem, flags=re.ASCII)  # an identifier of C
+    name = export.identifier(law.stem)
     file = output.checked(name + ending, (".h", "_test.c") if to == "c" else ())
     if to in PROGRAMS:
         if velocities is not None:

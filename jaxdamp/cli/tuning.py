@@ -5,7 +5,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -32,7 +32,7 @@ from jaxdamp.report import MOST_POINTS, Table, best_points, sweep_report, tuning
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import stationary_notes
 from jaxdamp.sweeps import grid, without_effect
-from jaxdamp.tune import Run, Status, TuneResult, limit_spans
+from jaxdamp.tune import Run, Status, TuneResult, goal_limits, limit_spans
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -162,12 +162,15 @@ def tuning_arguments(
 
 
 def _limits(car: AbstractVehicle, metric: str, search: Call, *, white: bool) -> tuple[dict[str, Limit], list[str]]:
-    """The limits given, that of the grip by default, and a remark on it."""
+    """The limits given, that of the grip of the other wheels by default, and a remark on it."""
     limits, remarks = in_si(search.given.get("limits", {}), car, white=white)
-    if not {"grip", *car.goal_metrics("grip", white=white)} & {*limits, metric}:
-        limits["grip"] = GRIP
-        sentence = f"Limited by default: grip (RMS variation of each tyre load) to {GRIP} of the start"
-        remarks.append(f"{sentence}; --limit grip=none removes it.")
+    wheels = [name for name in car.goal_metrics("grip", white=white) if name not in (*limits, metric)]
+    if wheels and not {"grip"} & {*limits, metric}:
+        every = len(wheels) == len(car.goal_metrics("grip", white=white))
+        limits |= dict.fromkeys(["grip"] if every else wheels, GRIP)
+        of = "of each tyre load" if every else f"of tyre loads: {', '.join(wheels)}"
+        sentence = f"Limited by default: grip (RMS variation {of}) to {GRIP} of the start"
+        remarks.append(f"{sentence}; --limit {'grip' if every else wheels[0]}=none removes it.")
     return {name: limit for name, limit in limits.items() if limit is not None}, remarks
 
 
@@ -293,10 +296,11 @@ def _present(car: AbstractVehicle, over: Mapping[str, np.ndarray]) -> dict[str, 
     return {name: value.pop() for name, value in values.items() if len(value) == 1}
 
 
-def _limits_by_metric(limit: Mapping[str, Limit], car: AbstractVehicle, *, white: bool) -> dict[str, Limit]:
+def _limits_by_metric(limit: Mapping[str, Limit], car: AbstractVehicle, *, white: bool) -> dict[str, Any]:
     """The limits by the ride metrics that their words mean."""
     given = {word: span for word, span in limit.items() if span is not None}
-    return {name: span for word, span in given.items() for name in _metrics_of("limit", word, car, white=white)}
+    spelled = goal_limits(given, car, white=white, argument="limit")
+    return {str(name): span for name, span in (spelled or {}).items()}
 
 
 def _metrics_of(option: str, word: str, car: AbstractVehicle, *, white: bool) -> list[str]:

@@ -87,7 +87,8 @@ def _preset(word: str, document: Contents) -> MakeCar:
     name, values, lifts = document.get("preset"), document.get("parameters", {}), document.get("tyre_lifts", False)
     if extra or not (isinstance(name, str) and isinstance(values, dict) and isinstance(lifts, bool)):
         must = "be a TOML file of preset, tyre_lifts (true or false) and [parameters]"
-        _checks.refuse("vehicle", must, f"one of {', '.join(document)}", EXAMPLE)
+        held = extra or [f"{key} = {value!r}" for key, value in document.items() if not isinstance(value, dict)]
+        _checks.refuse("vehicle", must, f"one of {', '.join(held)}", EXAMPLE)
     _checks.one_of(f"preset in {word}", name, presets())
     numbers = dict(_flat(values))
     return lambda law: replace(presets()[name](damper=law, tyre_lifts=lifts), numbers)

@@ -1,6 +1,7 @@
 """Laws, vehicles and roads written to files and read back; laws as C, as FMU, as tables of simulators and as a page."""
 
 from jaxdamp._guesses import answer_guesses
+from jaxdamp.export._law_program import identifier as identifier
 from jaxdamp.export.c_source import to_c
 from jaxdamp.export.explorer_page import to_explorer
 from jaxdamp.export.fmu import to_fmu

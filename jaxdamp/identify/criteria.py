@@ -226,18 +226,20 @@ def _in_rounds(
     return now.problem, solution
 
 
-def against_priors(problem: Problem, values: Float[np.ndarray, " free"]) -> list[str]:
-    """A sentence on each number of the law or machine that the records put far from what was known beforehand."""
-    said, free = [], problem.free
-    for part in (part for part in problem.residuals if isinstance(part, Priors) and not part.weak):
+def against_priors(
+    free: FreeParameters, residuals: Sequence[AbstractResiduals], values: Float[np.ndarray, " free"]
+) -> list[str]:
+    """How the records contradict what was known beforehand of each number of the law or machine, after "they"."""
+    said = []
+    for part in (part for part in residuals if isinstance(part, Priors) and part.relative):
         for row in part.linear_rows(free):
             i = int(np.argmax(row[:-1]))
             deviation, mean = float(part.noise) / row[i], -row[-1] / row[i]
             off, unit = abs(values[i] - mean) / deviation, f" {free.owners[i].unit}".rstrip()
             if off > CONTRADICTED:
                 said.append(
-                    f"The records contradict the prior of {free.names[i]}, {mean:.5g} ± {deviation:.2g}{unit}: "
-                    f"{values[i]:.5g} is {off:.2g} standard deviations away. Check the prior, or give it a wider one."
+                    f"contradict the prior of {free.names[i]}, {mean:.5g} ± {deviation:.2g}{unit}: "
+                    f"{values[i]:.5g} is {off:.2g} standard deviations away"
                 )
     return said
 

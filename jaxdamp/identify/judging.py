@@ -85,7 +85,10 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     law, rig = law_of(model), rig_of(model)
     fitted = np.isfinite(problem.sigma)
     percent, rmse, scores = score(models or model, problem.runs, fitted, problem.initial_state)
-    notes = on_status(best, estimates.unsettled, _REMEDY) + against_priors(problem, best.values)
+    against = against_priors(problem.free, problem.residuals, best.values)
+    notes = on_status(best, estimates.unsettled, _REMEDY) + [
+        f"The records {words}. Check the prior, or give it a wider one." for words in against
+    ]
     pooled = all(p.startswith("rig.") for p in problem.per_record) and not stated_values(model, problem.runs)
     on_records = (
         *notes_on(model, problem.fitted_to, pooled=pooled),

@@ -10,7 +10,7 @@ from jaxtyping import Array, Bool, Float, Int
 from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._triangles import rows_of_products
 from jaxdamp._types import Scalar
-from jaxdamp.identify.criteria import ROUNDS, SETTLED, Priors, Round
+from jaxdamp.identify.criteria import NEXT_TO_NOTHING, QUIETER, ROUNDS, SETTLED, Priors, Round
 from jaxdamp.identify.dependence import Dependence, Products
 from jaxdamp.identify.initial_states import DRIFT
 from jaxdamp.identify.noise import CORRELATED, correlation_time, levels_differ
@@ -107,14 +107,13 @@ def by_rounds(
         The lanes with the weights of the last round, and the end of each damper.
     """
     free, lanes, levels = end.y.shape[1], plain, np.array([problem.level for problem in plain.problems])
-    y, products, status, steps = end.y.copy(), end.aux.copy(), list(end.status), end.steps.copy()
     rounds = list(map(Round, plain.problems))
-    moving = np.isfinite(products[:, -1, -1]) & (products[:, -1, -1] > ROUNDING**2)
-    weighted = loss != "squares" or any(isinstance(part, Priors) for part in plain.problems[0].residuals)
-    for _ in range(ROUNDS if weighted else 0):
-        noise = np.ones(len(y))
+    moving = np.isfinite(end.aux[:, -1, -1]) & (end.aux[:, -1, -1] > ROUNDING**2)
+    priors = [part for part in plain.problems[0].residuals if isinstance(part, Priors)]
+    noise = np.ones(len(end.y))
+    for _ in range(ROUNDS if loss != "squares" or priors else 0):
         for i in map(int, np.flatnonzero(moving)):
-            residual = lanes.searches[i].here(y[i]).whole[:, -1]
+            residual = lanes.searches[i].here(end.y[i]).whole[:, -1]
             noise[i] = np.sqrt(lanes.mean(i, lanes.variances(i, residual, free)))
             after = rounds[i].after(plain.problems[i], residual, noise[i], loss)
             moving[i], rounds[i] = after is not None, after or rounds[i]
@@ -122,20 +121,51 @@ def by_rounds(
             break
         lanes = Lanes.of([one.problem for one in rounds], plain.force_noise)
         tried = np.flatnonzero(moving | (depends is not None))
-        again = solve(lanes._replace(damper=tried), y[tried])
+        again = solve(lanes._replace(damper=tried), end.y[tried])
         length = np.sqrt(np.maximum(np.diagonal(again.aux, axis1=1, axis2=2)[:, :-1], 0.0))
         if depends is None:
-            moved = np.abs(again.y - y[tried]) * length * levels[tried, None]
+            moved = np.abs(again.y - end.y[tried]) * length * levels[tried, None]
             settled = np.all(moved < SETTLED * noise[tried, None], axis=1)
         else:
-            moved = np.abs(depends.start(again.y) - depends.start(y)) * length[0]
-            settled = np.full(len(y), np.all(moved < SETTLED * np.mean(noise / levels)))
-        y[tried], products[tried] = again.y, again.aux
-        steps[tried] += again.steps
-        for i, ended in zip(tried, again.status, strict=True):
-            status[i] = ended
+            moved = np.abs(depends.start(again.y) - depends.start(end.y)) * length[0]
+            settled = np.full(len(end.y), np.all(moved < SETTLED * np.mean(noise / levels)))
+        end = _went_on(end, tried, again)
         moving[tried[settled]] = False
-    return lanes, SearchLanes(y, products, status, steps)
+    if loss != "squares" or not any(part.relative for part in priors):
+        return lanes, end
+    return _without_their_own_noise(lanes, end, noise, solve, depends)
+
+
+def _without_their_own_noise(
+    lanes: Lanes,
+    end: SearchLanes,
+    beside: Float[np.ndarray, " dampers"],
+    solve: Callable[[Lanes, Float[np.ndarray, "lanes free"]], SearchLanes],
+    depends: Dependence | None,
+) -> tuple[Lanes, SearchLanes]:
+    """Priors beside the noise of fits without them, where that is less: as `criteria.solve_by`, for each damper."""
+    free = [problem.at_noise(NEXT_TO_NOTHING * noise) for problem, noise in zip(lanes.problems, beside, strict=True)]
+    alone, problems = solve(Lanes.of(free, lanes.force_noise), end.y), list(lanes.problems)
+    for i, (y, squares) in enumerate(zip(alone.y, alone.aux[:, -1, -1], strict=True)):
+        residual = lanes.searches[i].here(y).whole[:, -1]
+        level = np.sqrt(lanes.mean(i, lanes.variances(i, residual, y.size)))
+        if squares > ROUNDING**2 and level < QUIETER * beside[i]:
+            problems[i] = problems[i].at_noise(level)
+    weighed = Lanes.of(problems, lanes.force_noise)
+    wrong = [one is not before for one, before in zip(problems, lanes.problems, strict=True)]
+    tried = np.flatnonzero(np.full(len(wrong), any(wrong)) if depends is not None else wrong)
+    if not tried.size:
+        return lanes, end
+    again = solve(weighed._replace(damper=tried), alone.y[tried])
+    return weighed, _went_on(end, tried, again)
+
+
+def _went_on(end: SearchLanes, lanes: Int[np.ndarray, " some"], again: SearchLanes) -> SearchLanes:
+    """The ends of searches of which some went on."""
+    y, products, status, steps = end.y.copy(), end.aux.copy(), np.array(end.status, object), end.steps.copy()
+    y[lanes], products[lanes], status[lanes] = again.y, again.aux, again.status
+    steps[lanes] += again.steps
+    return SearchLanes(y, products, list(status), steps)
 
 
 def judged(lanes: Lanes, end: SearchLanes, depends: Dependence | None) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from jaxdamp._tables import Cell, Column, Contents, Shown, Table, plain, with_un
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, Scheduled, with_fitted_range
 from jaxdamp.identify.covered import covered_range, joined_range
+from jaxdamp.identify.criteria import against_priors, priors_on
 from jaxdamp.identify.dependence import OWN, Dependence
 from jaxdamp.identify.estimates import rounded
 from jaxdamp.identify.estimating import WEAK
@@ -206,6 +207,9 @@ class ManyFits(AbstractResult):
         """Add to the remark on each damper in what it differs from the others that were fitted."""
         fitted = self._fitted
         settings = None if self.settings is None else tuple(np.array(self.settings)[fitted])
+        priors = priors_on(self.free, self.options.get("priors") or {})
+        for i in fitted:
+            texts[i] += [f"its records {words}" for words in against_priors(self.free, priors, self.values[i])]
         for i in np.flatnonzero(self.drift > DRIFT):
             texts[i].append(f"its states are not periodic: over a cycle they still change by {self.drift[i]:.2g}")
         misfit = 100.0 - self.fit_percent

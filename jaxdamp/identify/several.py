@@ -1,7 +1,8 @@
 """Several starts of a search: the best end is the result, the others show further minima.
 
-All starts use the same compiled program, one after the other. Starts other than the first are searched for a few steps;
-only the most promising ones are continued to their end. The few steps see the first part of long records.
+All starts use the same compiled program, one after the other. The first is searched to its end, or until it creeps;
+others for a few steps, which see the first part of long records, and the most promising ones as far as the first. What
+is best then is continued to its end.
 """
 
 from collections.abc import Sequence
@@ -22,11 +23,12 @@ from jaxdamp.parameters import FreeParameters
 
 FIRST_LOOK = 10  # steps after which starts are compared
 FOLLOWED = 2  # starts that are continued to their end, besides the first
-FOLLOWED_STEPS = 80  # of each of them at most
+FOLLOWED_STEPS = 80  # of each of them and of the first at most, before the best is continued
 PROMISING = 1.5  # sum of squares, relative to the best, up to which a start is continued
 INSIDE = 0.02  # distance of a start from the ends of a range, relative to its width
 ROUNDS = 3  # rounds of proposals, each from the best end of the previous round
 ALIKE = 1e-2  # difference of sums of squares, relative to them, of ends that count as equally good
+ELSEWHERE = 50.0  # squares of the change of force, relative to what they gain, of a look that left a minimum
 SAME = 1.0  # largest difference in chi-square of two ends of the same minimum
 WORTH_A_ROUND = 1e-3  # relative decrease of the sum of squares after which there is another round
 BETTER = 1e-9  # relative decrease of the sum of squares that counts as one
@@ -103,16 +105,16 @@ def search_from(problem: Problem, *, starts: int | None, max_steps: int, solver:
     wrong at the start.
     """
     searcher, begin = _Searcher(problem, solver, starts), np.asarray(problem.free.values)
-    best = searcher.end(begin, max_steps)
+    best = searcher.end(begin, max_steps if starts == 1 else min(FOLLOWED_STEPS, max_steps))
     ends, tried = [best], [begin]
     for _ in range(ROUNDS):
-        if len(tried) == starts or (best.finite and problem.is_rounding(best.squares)):
+        if len(tried) == starts or (best.converged and problem.is_rounding(best.squares)):
             break
         others = _not_among(tried, other_starts(problem.free, problem.reach))
         others = others[: None if starts is None else starts - len(tried)]
         tried, ends = [*tried, *others], [*ends, *_follow(searcher, others, best, max_steps)]
         before, end = best, _least(ends, best)
-        best = end if end is before else searcher.to_its_end(end, max_steps)
+        best = searcher.to_its_end(end, max_steps)
         ends = [best if one is end else one for one in ends]
         if before.finite and best.squares >= (1.0 - WORTH_A_ROUND) * before.squares:
             break
@@ -166,19 +168,33 @@ def _follow(searcher: _Searcher, others: Sequence[np.ndarray], best: SearchEnd, 
         return []
     steps = min(FIRST_LOOK, max_steps)
     here = searcher.look(best.values, steps) if searcher.takes_part else best
-    looks = [searcher.look(values, steps) for values in others]
+    looks, known = [searcher.look(values, steps) for values in others], [(here, best)]
+    variance = here.squares / np.count_nonzero(searcher.problem.used)
+    if searcher.takes_part and _left(best, here, searcher.look(best.values, 1).squares, variance):
+        looks, known = [here, *looks], []
+    ends = [end for end in looks if end.converged]
+    for look in _promising(here, looks)[:FOLLOWED]:
+        end = next((end for seen, end in known if seen.finite and _apart(look, seen) < SAME * variance), None)
+        if end is None:
+            # at least one point on all samples
+            most = np.clip(max_steps, look.steps + searcher.takes_part, look.steps + FOLLOWED_STEPS)
+            end = searcher.to_its_end(look, int(most))
+            known.append((look, end))
+        ends.append(end)
+    return ends
+
+
+def _promising(here: SearchEnd, looks: Sequence[SearchEnd]) -> list[SearchEnd]:
+    """The looks that are worth being continued, beside that of the best end, the most promising first."""
     most = PROMISING * min([end.squares for end in (here, *looks) if end.finite], default=np.inf)
     open_ended = (end for end in looks if not end.converged and end.finite and end.squares < most)
-    promising = sorted(open_ended, key=lambda end: end.squares)
-    ends, variance = [end for end in looks if end.converged], here.squares / np.count_nonzero(searcher.problem.used)
-    for look in promising[:FOLLOWED]:
-        if here.finite and _apart(look, here) < SAME * variance:
-            ends.append(best)
-            continue
-        # at least one point on all samples
-        most = np.clip(max_steps, look.steps + searcher.takes_part, look.steps + FOLLOWED_STEPS)
-        ends.append(searcher.to_its_end(look, int(most)))
-    return ends
+    return sorted(open_ended, key=lambda end: end.squares)
+
+
+def _left(best: SearchEnd, here: SearchEnd, before: float, variance: float) -> bool:
+    """Whether the look from an end, on a part of the samples, has left its minimum, within which both are alike."""
+    change = best.jacobian @ (here.values - best.values)
+    return bool(change @ change > ELSEWHERE * max(before - here.squares, variance))
 
 
 def _apart(end: SearchEnd, other: SearchEnd) -> float:

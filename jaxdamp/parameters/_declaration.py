@@ -30,7 +30,7 @@ def as_float(value: object, name: str = "value") -> Array:
     refuse_fork()
     if isinstance(value, jax.Array) and jnp.issubdtype(value.dtype, jnp.floating):
         return value
-    if value is None or isinstance(value, str | bytes | type | eqx.Module):
+    if value is None or isinstance(value, bool | str | bytes | type | eqx.Module):
         _checks.refuse(name, "be a number", _checks.described(value))
     plain = all(isinstance(each, int | float) for each in (value if isinstance(value, list | tuple) else (value,)))
     try:

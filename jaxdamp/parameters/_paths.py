@@ -140,7 +140,7 @@ def replace(tree: Tree, values: Mapping[str, object]) -> Tree:
             if path in named:
                 both = f"{named[path]!r} and {name!r}, which both name {path}"
                 _checks.refuse("values", "name each parameter once", both, "Write the paths of all of them.")
-            named[path], by_path[path] = name, as_float(value)
+            named[path], by_path[path] = name, as_float(value, name)
     return checked(with_values(tree, by_path))
 
 

@@ -109,6 +109,9 @@ class Rig(AbstractDeclared):
     initial_rise: Number = parameter("K", "ϑ at the start, above the reference temperature", default=0.0)
     reference_temperature: Number = setting("K", "temperature of the law's own numbers", positive, default=293.15)
 
+    def __check_init__(self) -> None:
+        _checks.kelvin("Rig.reference_temperature", self.reference_temperature)
+
     def force(
         self,
         law: AbstractDamper,

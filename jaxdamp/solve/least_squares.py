@@ -18,6 +18,7 @@ import optimistix as optx
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float, Int, PyTree
 
+from jaxdamp import _checks
 from jaxdamp._status import Status
 from jaxdamp._triangles import triangle
 from jaxdamp._types import ScalarLike
@@ -91,6 +92,14 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
     atol: float = 1e-9
     patience: int | None = None
     norm: Callable[[PyTree], Array] = optx.max_norm
+
+    def __check_init__(self) -> None:
+        lower, upper = (jtu.tree_leaves(side) for side in (self.lower, self.upper))
+        count = max(len(lower), len(upper))
+        for low, high in zip(lower * (count // len(lower)), upper * (count // len(upper)), strict=False):
+            ends = _checks.concrete(low), _checks.concrete(high)
+            if ends[0] is not None and ends[1] is not None and np.any(ends[0] > ends[1]):
+                _checks.refuse("lower", "be at most `upper`", f"{low} above {high}")
 
     def init(
         self,
@@ -217,11 +226,14 @@ def rules_of(solver: BoundedLevenbergMarquardt, xp: ModuleType, like: PyTree) ->
     else:
         flat, _ = ravel_pytree(like)
         same, dtype = jtu.tree_structure(like), flat.dtype
-        sides = (
-            ravel_pytree(side)[0] if jtu.tree_structure(side) == same else jnp.asarray(side)
-            for side in (solver.lower, solver.upper)
-        )
-        lower, upper = (jnp.broadcast_to(side.astype(dtype), flat.shape) for side in sides)
+
+        def vector(side: PyTree) -> Array:
+            if jtu.tree_structure(side) != same:
+                return jnp.broadcast_to(jnp.asarray(side, dtype), flat.shape)
+            leaves = jtu.tree_map(lambda bound, leaf: jnp.broadcast_to(bound, jnp.shape(leaf)), side, like)
+            return ravel_pytree(leaves)[0].astype(dtype)
+
+        lower, upper = vector(solver.lower), vector(solver.upper)
     precision = solver.precision or float(jnp.finfo(dtype).eps)
     return Rules(lower, upper, solver.tolerance, precision, solver.rtol, solver.atol, solver.patience)
 

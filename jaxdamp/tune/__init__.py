@@ -19,7 +19,7 @@ from jaxdamp.tune.decisions import DamperComparison as DamperComparison, compare
 from jaxdamp.tune.front import ParetoFront as ParetoFront, hypervolume as hypervolume
 from jaxdamp.tune.limits import Limits as Limits, half_interval as half_interval, limit_spans as limit_spans
 from jaxdamp.tune.minimising import minimise
-from jaxdamp.tune.objective import Targets
+from jaxdamp.tune.objective import Targets, goal_limits as goal_limits
 from jaxdamp.tune.pareto_search import pareto
 from jaxdamp.tune.ranges import Choice
 from jaxdamp.tune.rescoring import Rescore as Rescore, rescore

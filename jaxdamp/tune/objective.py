@@ -165,19 +165,35 @@ def _mean_of(word: str, names: tuple[str, ...]) -> Function:
 
 
 def goal_limits(
-    limits: Limits | None, vehicle: AbstractVehicle, *, white: bool, known: Sequence[str] = ()
+    limits: Limits | None,
+    vehicle: AbstractVehicle,
+    *,
+    white: bool,
+    known: Sequence[str] = (),
+    argument: str = "limits",
 ) -> Limits | None:
-    """Limits with "comfort", "travel" and "grip" spelled out: each metric of a goal gets its limit."""
+    """Limits with "comfort", "travel" and "grip" spelled out: each metric of a goal gets its limit.
+
+    Arguments:
+        limits: by metric or goal; anything else is given back.
+        vehicle: whose metrics are meant.
+        white: for stationary rides on a white road.
+        known: names that are no metrics of the vehicle.
+        argument: name of `limits` in messages.
+
+    Raises:
+        ValueError: an unknown name, or two limits of one metric.
+    """
     if not isinstance(limits, Mapping):
         return limits
     spelled: dict[str | Metric, Ends] = {}
     given: dict[str | Metric, str | Metric] = {}
     for one, span in limits.items():
-        names = metrics_of("limits", one, vehicle, white=white) if isinstance(one, str) and one not in known else [one]
+        names = metrics_of(argument, one, vehicle, white=white) if isinstance(one, str) and one not in known else [one]
         for name in names:
             if name in given:
                 both = f"{given[name]!r} and {one!r}, which both limit {name}"
-                _checks.refuse("limits", "limit each metric once", both, "Write the names of all metrics.")
+                _checks.refuse(argument, "limit each metric once", both, "Write the names of all metrics.")
             spelled[name], given[name] = span, one
     return spelled
 

@@ -196,8 +196,8 @@ def _in_one(
     offsets: dict[str, Array],
 ) -> dict[str, Scalar]:
     """The metrics of a vehicle by name in one scenario."""
-    changed = {path: factors[path] * get(vehicle, path) + offsets[path] for path in factors}
-    ride = scenarios.ride.of_vehicle(with_values(vehicle, changed))
+    changed = _changed(vehicle, {path: (factors[path], offsets[path]) for path in factors})
+    ride = scenarios.ride.of_vehicle(changed)
     field = "road" if isinstance(road, WhiteRoad) else "heights"
     return dict(eqx.tree_at(lambda ride: getattr(ride, field), ride, road)())
 
@@ -257,8 +257,8 @@ def _checked_rides(
     for i, scenario in enumerate(scenarios):
         if id(scenario.road) in by_road and scenario.road is not scenarios[0].road:
             continue
-        changed = {path: pairs[i][0] * get(vehicle, path) + pairs[i][1] for path, pairs in changes.items()}
-        ride = Ride(checked(with_values(vehicle, changed)), scenario.road, metrics=metrics, **run)
+        changed = _changed(vehicle, {path: pairs[i] for path, pairs in changes.items()})
+        ride = Ride(checked(changed), scenario.road, metrics=metrics, **run)
         by_road.setdefault(id(scenario.road), ride)
         if most is None or ride.substeps > most.substeps:
             most = ride
@@ -269,6 +269,16 @@ def _checked_rides(
         lengths = ", ".join(sorted(f"{(count - 1) * most.dt:g} s" for count in counts))
         _checks.refuse("roads", "be driven for the same time", lengths, "Pass `duration`.")
     return most, rides
+
+
+def in_condition(vehicle: AbstractVehicle, condition: "Condition") -> AbstractVehicle:
+    """A vehicle in a condition."""
+    return checked(_changed(vehicle, {path: pairs[0] for path, pairs in _changes(vehicle, [condition]).items()}))
+
+
+def _changed(vehicle: AbstractVehicle, changes: Mapping[str, tuple[Array, Array]]) -> AbstractVehicle:
+    """The vehicle with factor · value + offset for each of these numbers."""
+    return with_values(vehicle, {path: factor * get(vehicle, path) + add for path, (factor, add) in changes.items()})
 
 
 def _changes(vehicle: AbstractVehicle, conditions: Sequence["Condition"]) -> dict[str, list[tuple[Array, Array]]]:

@@ -29,7 +29,8 @@ from jaxdamp.tune.measuring import BatchProgram, Computed, Measurement
 from jaxdamp.tune.objective import Function, Targets, goal_limits, goal_objective, objective_of
 from jaxdamp.tune.ranges import search_range
 from jaxdamp.tune.result import V
-from jaxdamp.tune.scenarios import Road, Scenarios
+from jaxdamp.tune.scenario_ride import in_condition
+from jaxdamp.tune.scenarios import Condition, Road, Scenario, Scenarios
 from jaxdamp.tune.settings import LEAST, RUN, Settings
 from jaxdamp.tune.shape import ShapeNumbers
 from jaxdamp.vehicles import AbstractVehicle
@@ -178,11 +179,13 @@ class DesignTask(Generic[V]):
             _checks.refuse(self._argument, "depend on what is free", f"{values} whatever they are", remedy)
 
     def notes_on_runs(self, design: AbstractVehicle) -> tuple[list[str], list[str]]:
-        """Notes on the step and on the fitted ranges for a design, on every road; and the dampers far outside."""
-        metrics, white = self.objective.metrics, is_white(self.road)
-        roads = [s.road for s in self.road.scenarios] if isinstance(self.road, Scenarios) else [self.road]
-        distinct = {id(one): one for one in roads}.values()  # in no special condition
-        rides = [lambda vehicle, one=one: Ride(vehicle, one, metrics=metrics, **self.run) for one in distinct]
+        """Notes on the step and on the fitted ranges for a design, in every scenario; and the dampers far outside."""
+        on, white, metrics = self.road, is_white(self.road), self.objective.metrics
+        scenarios = on.scenarios if isinstance(on, Scenarios) else [Scenario("", on, Condition(), 1.0)]
+        rides = [
+            lambda vehicle, s=s: Ride(in_condition(vehicle, s.condition), s.road, metrics=metrics, **self.run)
+            for s in scenarios
+        ]
         road = rides[0](design).road if white else None
         notes = stationary_notes(design, road) if isinstance(road, WhiteRoad) else []
         coarse = [[] if white else step_notes(self.vehicle, design, ride_of) for ride_of in rides]

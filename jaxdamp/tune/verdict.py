@@ -319,19 +319,19 @@ def workshop_notes(space: SearchRange) -> list[str]:
 
 
 def without_effect(space: SearchRange, sides: tuple[Evaluation, Evaluation], ended: np.ndarray) -> tuple[str, ...]:
-    """The parameters by which the derivative of the metric is zero at the start and at the end, but for rounding.
+    """The parameters by which metric and limits have derivatives of zero at the start and the end, but for rounding.
 
     Choices are left out: other values may have an effect.
     """
     idle = ~space.is_choice
     for at, (_, rows, slopes) in zip((space.start, ended), sides, strict=True):
-        rounded = np.abs(slopes[0] * at / space.unit) <= _ROUNDING * abs(rows[0])
-        idle &= (slopes[0] == 0.0) | (rounded & (at != 0.0))
+        rounded = np.abs(slopes * at / space.unit) <= _ROUNDING * abs(rows)[:, None]
+        idle &= np.all((slopes == 0.0) | (rounded & (at != 0.0)), axis=0)
     return tuple(name for name, none in zip(space.free.names, idle, strict=True) if none)
 
 
 def effect_notes(idle: Sequence[str], metric: str) -> list[str]:
-    """A sentence on the parameters without effect."""
+    """A sentence on the parameters without effect on metric and limits."""
     if not idle:
         return []
     theirs = "their tuned values say" if len(idle) > 1 else "its tuned value says"

@@ -90,6 +90,17 @@ def test_mat(tmp_path, version):
     same(read(path)[0])
 
 
+def test_records_of_mat_7_3_come_by_name(tmp_path, monkeypatch):
+    """The library lists the fields of HDF5 in another order in each process."""
+    import pymatreader
+
+    record = {"t_s": T, "x_mm": X, "F_N": F}
+    path = tmp_path / "a.mat"
+    path.write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\0\2IM")
+    monkeypatch.setattr(pymatreader, "read_mat", lambda _: {"warm": record, "cold": record, "hot": record})
+    assert read(path).names == ("a/cold", "a/hot", "a/warm")
+
+
 def test_arrays_of_structures_and_matrices_in_mat(tmp_path):
     import scipy.io
 

@@ -12,6 +12,8 @@ import pytest
 from jaxdamp import vehicles
 from jaxdamp._words import said
 from jaxdamp.cli.controlling import parse_policy
+from jaxdamp.cli.options import Call
+from jaxdamp.cli.tuning import _limits
 from jaxdamp.cli.vehicle_words import parse_vehicle
 from jaxdamp.control import Skyhook
 from jaxdamp.dampers import Bilinear, Linear, Scheduled
@@ -20,6 +22,7 @@ from jaxdamp.export import from_json, to_json
 from .invoking import jaxdamp, refused
 
 
+FRONT = "rms_front_dynamic_tyre_load"
 BEST = 60e3 * (1325.0 / 220e3) ** 0.5
 
 
@@ -174,6 +177,8 @@ WRONG = [
     (["tune", "LAW", "white:C"], "VEHICLE must be a vehicle as JSON, but is a Linear"),
     (["tune", "BAD", "white:C"], "VEHICLE must be TOML, but is {BAD}"),
     (["tune", "ODD", "white:C"], "be a TOML file of preset, tyre_lifts (true or false) and [parameters]"),
+    (["tune", "LIFTS", "white:C"], "but is one of preset = 'quarter_car_000', tyre_lifts = 1"),
+    (["tune", "TRUE", "white:C"], "`sprung_mass` must be a number, but is True"),
     (["tune", "UNKNOWN", "white:C"], "must be one of"),
     (["tune", "WRONG", "white:C"], "did you mean 'sprung_mass'"),
     (["tune", "NEGATIVE", "white:C"], "must be positive"),
@@ -189,6 +194,10 @@ WRONG = [
     (["tune", "quarter_car_000", "white:C", "--limit", "travel=4lbf"], "must be in a unit of travel, such as m, but"),
     (["tune", "quarter_car_000", "white:C", "--limit", "travel=2:4in"], "each with its unit or both in SI"),
     (["tune", "quarter_car_000", "white:C", "--limit", "travel=1,travel=2"], "name each thing once"),
+    (
+        ["sweep", "half_car_002", "white:C", "--over", "rate=1;2", "--limit", "grip=1,rms_front_dynamic_tyre_load=2"],
+        "Option --limit must limit each metric once",
+    ),
     (["tune", "quarter_car_000", "white:C", "--over", "damper.rat"], "did you mean 'damper.rate'"),
     (["tune", "quarter_car_000", "white:C", "--bound", "rate"], "Option --bound must read like NAME=VALUE"),
     (["tune", "quarter_car_000", "white:C", "--bound", "rate=5lbf:9lbf"], "must be in a unit of rate, such as N s/m"),
@@ -234,8 +243,19 @@ FILES = {
     "ODD": 'prset = "quarter_car_000"',
     "UNKNOWN": 'preset = "quarter_car_0"',
     "WRONG": 'preset = "quarter_car_000"\n[parameters]\nsprung_mas = 1.0',
+    "LIFTS": 'preset = "quarter_car_000"\ntyre_lifts = 1',
+    "TRUE": 'preset = "quarter_car_000"\n[parameters]\nsprung_mass = true',
     "NEGATIVE": 'preset = "quarter_car_000"\n[parameters]\nsprung_mass = -1.0',
 }
+
+
+def test_a_limit_on_one_wheel_leaves_that_of_the_others() -> None:
+    car, search = vehicles.presets.half_car_002(), Call("tune.minimise", {"limits": {FRONT: "+5%"}})
+    limits, (remark,) = _limits(car, "comfort", search, white=False)
+    assert limits == {FRONT: "+5%", "rms_rear_dynamic_tyre_load": "+10%"}
+    assert "of tyre loads: rms_rear_dynamic_tyre_load) to +10%" in remark
+    for given, expected in (({}, {"grip": "+10%"}), ({"grip": None}, {}), ({"grip": "+3%"}, {"grip": "+3%"})):
+        assert _limits(car, "comfort", Call("tune.minimise", {"limits": given}), white=False)[0] == expected
 
 
 def _tied(folder: Path) -> list:

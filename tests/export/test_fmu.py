@@ -136,6 +136,37 @@ def test_with_the_inputs_of_an_instant_the_force_is_that_of_respond(unit, name, 
     np.testing.assert_allclose(force, expected, rtol=0.0, atol=close * np.abs(expected).max())
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("substeps", [1, 2])
+def test_a_command_goes_straight_as_that_of_respond(unit, substeps):
+    """Its new value counted over the whole step before: force 1.4 % wrong at 4 ms."""
+    one, step = unit("scheduled"), 4e-3
+    time = instants(step)
+    command = 0.7 + 0.6 * np.sin(40.0 * time)
+    one.set(longest_step=step / substeps)
+    force = [one.get("F")]
+    for place, now in enumerate(time[:-1], 1):
+        one.fmu.doStep(now, step)
+        one.move(time[place])
+        one.set(command=command[place])
+        force.append(one.get("F"))
+    close = 1e-12 if substeps == 1 else 2e-3  # as above
+    expected = np.asarray(respond(LAWS["scheduled"], time, *motion(time), command=command, substeps=substeps))
+    np.testing.assert_allclose(force, expected, rtol=0.0, atol=close * np.abs(expected).max())
+
+
+@pytest.mark.slow
+def test_the_rate_of_a_command_is_followed(unit):
+    """It was taken without a word and did nothing."""
+    one, time, command = unit("scheduled"), np.array([0.0, 4e-3]), np.array([0.7, 1.1])
+    one.set(longest_step=4e-3)
+    one.fmu.setRealInputDerivatives([one.at["command"]], [1], [100.0])
+    one.fmu.doStep(0.0, 4e-3)
+    one.move(4e-3)
+    expected = np.asarray(respond(LAWS["scheduled"], time, *motion(time), command=command))[-1]
+    assert one.get("command") == pytest.approx(1.1) and one.get("F") == pytest.approx(float(expected), rel=1e-12)
+
+
 def test_input_derivatives_and_held_inputs(unit):
     one, (x, v) = unit("series"), motion(0.0)
     one.fmu.setRealInputDerivatives([one.at["x"], one.at["v"]], [1, 1], [v, 10.0])

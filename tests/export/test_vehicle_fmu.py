@@ -256,6 +256,19 @@ def test_parameters_steps_and_units(files, tmp_path):
     assert "state.damper[0]" in known
 
 
+def test_a_number_counts_from_the_instant_at_which_it_is_set(files, tmp_path):
+    """It counted over the whole step before, so that a command acted a step too early."""
+    name, step, place = "quarter", 1e-3, 40
+    unit, channels = Unit(files(name), tmp_path, signals(name, step)), ["z_sprung", "z_unsprung"]
+    other = Unit(files(name), tmp_path, signals(name, step))
+    softer = {"damper.terms[0].law.rebound_rate": 500.0, "damper.terms[0].law.compression_rate": 400.0}
+    expected = other.run(channels, step)
+    found = unit.run(channels, step, lambda at: unit.set(**softer) if at == place else None)
+    np.testing.assert_array_equal(found[: place + 1], expected[: place + 1])
+    assert np.abs(found - expected)[place + 20 :].max() > 1e-4
+
+
+@pytest.mark.slow
 def test_directional_derivatives(files, tmp_path):
     name = "quarter"
     unit = Unit(files(name), tmp_path, signals(name, STEPS[0]), fmpy.fmi2.FMU2Model)

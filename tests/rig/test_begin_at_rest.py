@@ -127,5 +127,7 @@ def test_what_is_refused():
         TemperatureScaled(Linear(2000.0), 60.0)
     with pytest.raises(ValueError, match=r"`Heated.reference_temperature` must be in kelvin"):
         Heated(Linear(2000.0), reference_temperature=20.0)
+    with pytest.raises(ValueError, match=r"`Rig.reference_temperature` must be in kelvin"):
+        Rig(temperature_slope=0.002, reference_temperature=20.0)
     with pytest.raises(ValueError, match=r"`stroke` must stay from .* for MonoTube"):
         quasi_static(MonoTube.reference(), np.array([0.1]), stroke=0.2)

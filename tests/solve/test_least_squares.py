@@ -147,6 +147,15 @@ def test_unknowns_and_residuals_may_be_trees():
     assert float(found.value["rate"]) == pytest.approx(1.2) and found.value["level"].shape == ()
 
 
+def test_bounds_are_numbers_for_vectors_and_in_order():
+    solver = BoundedLevenbergMarquardt(lower={"a": -1.0, "b": 0.0}, upper={"a": 5.0, "b": 1.0})
+    start = {"a": jnp.zeros(()), "b": jnp.zeros(2)}
+    found = optx.least_squares(lambda y, _: (y["a"] - 1.0, y["b"] - jnp.array([2.0, -3.0])), solver, start)
+    assert float(found.value["a"]) == pytest.approx(1.0) and found.value["b"].tolist() == [1.0, 0.0]
+    with pytest.raises(ValueError, match=r"`lower` must be at most `upper`, but is 3\.0 above 1\.0"):
+        BoundedLevenbergMarquardt(lower=3.0, upper=1.0)
+
+
 def test_a_column_without_effect_leaves_a_finite_step():
     """However long the search: the least damping keeps the system solvable."""
     solver = BoundedLevenbergMarquardt(lower=np.full(2, -np.inf), upper=np.full(2, np.inf))

@@ -1,6 +1,7 @@
 """A tuning says by how much its start and its result leave the range of their records."""
 
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from jaxdamp import dampers, roads, tune, vehicles
 from jaxdamp.vehicles import linearise, stationary_rms
 
 
+GRIP = "rms_dynamic_tyre_load"
 LAW = dampers.with_fitted_range(dampers.Linear(2500.0), velocity=(-0.02, 0.02))
 
 
@@ -39,3 +41,13 @@ def test_on_a_driven_road_the_run_itself_is_looked_at():
         times = float(re.findall(r"\(([\d.e+]+) times\)", note)[0])
         assert times == pytest.approx(metrics["peak_damper_velocity"] / 0.02, rel=0.05)
     assert start.startswith("At the start, damper:") and after.startswith("After the tuning, damper:")
+
+
+def test_the_motion_in_each_condition_is_looked_at():
+    """A worn damper moves faster than that of the design, which no scenario drives."""
+    car = vehicles.presets.quarter_car_000(dampers.with_fitted_range(dampers.Linear(2500.0), velocity=(-2.0, 2.0)))
+    how: dict[str, Any] = {"over": ["damper.rate"], "bounds": {"damper.rate": (2000.0, 3000.0)}, "max_steps": 2}
+    assert not [note for note in tune.minimise(GRIP, car, roads.white("C", 20.0), **how).warnings if "fitted" in note]
+    for factor, outside in ((0.05, True), (1.0, False)):
+        worn = tune.Scenarios([roads.white("C", 20.0)], [tune.Condition(factors={"damper.rate": factor})])
+        assert bool([note for note in tune.minimise(GRIP, car, worn, **how).warnings if "fitted" in note]) == outside

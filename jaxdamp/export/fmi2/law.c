@@ -1,4 +1,6 @@
 /* A damper law as the unit sees it: one input, the stroke, with its rate, the velocity. */
+#include <string.h>
+
 #define PAIRS 1
 #define RATES PAIRS
 #define OUTPUTS 1
@@ -6,6 +8,7 @@
 #define CARRY MODEL_STATES
 #define MATRICES 0
 #define RATES_GIVEN 1 /* the velocity is an input that counts even where it is zero */
+#define NUMBERS_MOVE 1 /* straight over a step */
 #define UNUSED(name) ((void)(name))
 
 static void prepare(const model_parameters *p, double h, double *m) { UNUSED(p), UNUSED(h), UNUSED(m); }
@@ -19,19 +22,25 @@ static void resume(const double *m, const double *u, double ratio, double *c) {
     UNUSED(m), UNUSED(u), UNUSED(ratio), UNUSED(c);
 }
 
-/* n steps: the velocity is linear in time, the stroke the cubic with these velocities. */
-static void advance(const model_parameters *p, const double *m, const double *u0, const double *u1, double h, int n,
-                    double *c) {
+/* n steps: velocity and numbers are linear in time, the stroke the cubic with these velocities. */
+static void advance(const model_parameters *p0, const model_parameters *p1, const double *m, const double *u0,
+                    const double *u1, double h, int n, double *c) {
     const double x0 = u0[0], v0 = u0[1], x1 = u1[0], v1 = u1[1];
+    const double *from = (const double *)p0, *to = (const double *)p1;
+    const int moves = memcmp(from, to, sizeof *p0) != 0;
+    model_parameters middle = *p1;
     double x = x0, v = v0;
     int i;
+    size_t k;
     UNUSED(m);
     for (i = 1; i <= n; ++i) {
-        const double s = (double)i / n, r = 1.0 - s;
+        const double s = (double)i / n, r = 1.0 - s, half = (i - 0.5) / n;
         const double rise = h * (v0 * s * r * r - v1 * s * s * r);
         const double next = i == n ? x1 : x0 * (1.0 + 2.0 * s) * r * r + x1 * s * s * (3.0 - 2.0 * s) + rise;
         const double faster = i == n ? v1 : v0 + s * (v1 - v0);
-        model_advance(p, x, v, next, faster, h / n, c);
+        for (k = 0; moves && k < sizeof middle / sizeof *to; ++k)
+            ((double *)&middle)[k] = from[k] + half * (to[k] - from[k]);
+        model_advance(&middle, x, v, next, faster, h / n, c);
         x = next;
         v = faster;
     }

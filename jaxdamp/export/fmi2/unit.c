@@ -9,7 +9,8 @@
  *
  * Co-simulation has no delay of a step. A step ends at inputs that the importer knows only afterwards: after fmi2DoStep
  * they are extrapolated (or follow from fmi2SetRealInputDerivatives), and as soon as the inputs of the new instant are
- * set, the states are those of the step between the true inputs.
+ * set, the states are those of the step between the true inputs. Numbers, commands among them, count from the instant
+ * at which they are set; those of a law (NUMBERS_MOVE) go straight to it over the step before.
  */
 #include <math.h>
 #include <stdlib.h>
@@ -25,7 +26,9 @@ enum { FIRST_OUTPUT = INPUTS, LONGEST_STEP = INPUTS + OUTPUTS, FIRST_NUMBER };
 
 typedef struct {
     const fmi2CallbackFunctions *functions; /* of the importer */
-    model_parameters p;
+    model_parameters p;             /* now */
+    model_parameters before;        /* over the step that ends now; with NUMBERS_MOVE at its beginning */
+    double number_slope[NUMBERS];   /* rates given by the importer */
     double longest;                 /* s, longest step of the model; longer communication steps are divided */
     double matrices[MATRICES + 1];  /* what follows from the parameters and this step */
     double step;                    /* s */
@@ -102,15 +105,16 @@ static void refresh(Model *m) {
     memcpy(u0, m->input0, sizeof u0);
     memcpy(m->used, m->input, sizeof u0);
     if (m->h > 0.0) use_slopes(m, u0);
+    if (m->h <= 0.0) m->before = m->p;
     if (m->changed || fabs(step - m->step) > 1e-9 * step) {
-        prepare(&m->p, step, m->matrices);
+        prepare(&m->before, step, m->matrices);
         if (m->h > 0.0) resume(m->matrices, u0, step / m->step, m->carry);
         m->step = step;
         m->changed = 0;
     }
     if (!m->started) start(&m->p, m->matrices, m->input, m->carry);
     memcpy(m->end, m->carry, sizeof m->end);
-    if (m->h > 0.0) advance(&m->p, m->matrices, u0, m->used, m->h, n, m->end);
+    if (m->h > 0.0) advance(&m->before, &m->p, m->matrices, u0, m->used, m->h, n, m->end);
     m->known = 1;
 }
 
@@ -180,7 +184,7 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
             }
         } else if (k >= FIRST_NUMBER && k < FIRST_STATE) {
             double *number = (double *)&m->p + (k - FIRST_NUMBER);
-            if (*number != value[i]) m->changed = 1;
+            if (m->h <= 0.0 && *number != value[i]) m->changed = 1;
             *number = value[i];
         } else {
             return fmi2Error;
@@ -276,7 +280,7 @@ fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real nominal[]
         memcpy(u0, u1, sizeof u0);
         for (k = 0; k < PAIRS; ++k) u1[k] = m->input[k] + 0.02 * (1.0 - cos(phase));
         for (k = 0; k < RATES; ++k) u1[PAIRS + k] = 0.02 * rate * sin(phase);
-        advance(&m->p, m->matrices, u0, u1, m->step, 1, carry);
+        advance(&m->p, &m->p, m->matrices, u0, u1, m->step, 1, carry);
         for (i = 0; i < n; ++i) nominal[i] = fmax(nominal[i], fabs(carry[i]));
     }
     for (i = 0; i < n; ++i)
@@ -292,11 +296,27 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
     size_t i;
     for (i = 0; i < n; ++i) {
         if (order[i] != 1) return fmi2Error;
-        if (vr[i] >= FIRST_OUTPUT) continue;
-        m->slope[vr[i]] = value[i];
-        m->given[vr[i]] = 1;
+        if (vr[i] < FIRST_OUTPUT) {
+            m->slope[vr[i]] = value[i];
+            m->given[vr[i]] = 1;
+        } else if (vr[i] >= FIRST_NUMBER && vr[i] < FIRST_STATE) {
+            m->number_slope[vr[i] - FIRST_NUMBER] = value[i];
+        }
     }
     return fmi2OK;
+}
+
+/* The numbers of the step that begins, and those at its end as far as they are known. */
+static void use_numbers(Model *m, double h) {
+    double *now = (double *)&m->p, *before = (double *)&m->before;
+    size_t k;
+    for (k = 0; k < NUMBERS; ++k) {
+        const double rise = h * m->number_slope[k], begin = now[k] + (NUMBERS_MOVE ? 0.0 : 0.5 * rise);
+        if (before[k] != begin) m->changed = 1;
+        before[k] = begin;
+        now[k] += rise;
+        m->number_slope[k] = 0.0;
+    }
 }
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real h, fmi2Boolean final) {
@@ -313,6 +333,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real h, fmi2Boolean fi
         return refused(m, "The communication step cannot be divided so that samples and their commands lie between two "
                           "steps of the model: take the controller's period, a part or a multiple of it.");
     memcpy(m->carry, m->end, sizeof m->carry);
+    use_numbers(m, h);
     for (k = RATES; k < PAIRS; ++k) {
         m->input0[k] = m->input[k];
         if (m->given[k]) m->input[k] += h * m->slope[k];
