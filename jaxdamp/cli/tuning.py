@@ -5,7 +5,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, cast
 
 import numpy as np
 import typer
@@ -296,11 +296,11 @@ def _present(car: AbstractVehicle, over: Mapping[str, np.ndarray]) -> dict[str, 
     return {name: value.pop() for name, value in values.items() if len(value) == 1}
 
 
-def _limits_by_metric(limit: Mapping[str, Limit], car: AbstractVehicle, *, white: bool) -> dict[str, Any]:
+def _limits_by_metric(limit: Mapping[str, Limit], car: AbstractVehicle, *, white: bool) -> dict[str, Limit]:
     """The limits by the ride metrics that their words mean."""
     given = {word: span for word, span in limit.items() if span is not None}
     spelled = goal_limits(given, car, white=white, argument="limit")
-    return {str(name): span for name, span in (spelled or {}).items()}
+    return cast(dict[str, Limit], spelled)
 
 
 def _metrics_of(option: str, word: str, car: AbstractVehicle, *, white: bool) -> list[str]:
