@@ -70,12 +70,13 @@ def spectrum_of(time: Samples, stroke: Samples, frequency: float) -> Spectrum:
 def _repeating(time: Samples, stroke: Samples) -> tuple[float, float]:
     """Shares of the power that are the same in all cycles: of the slow part of the stroke, and of the fast one.
 
-    The Fourier series over all n cycles has what repeats in each nth line, and as much noise there as elsewhere.
+    The Fourier series over all n cycles has what repeats in each nth line, and as much noise there as elsewhere. Of one
+    cycle or none nothing is known to differ.
     """
     instants = cycle_instants(time, stroke)
     cycles = len(instants) - 1
     if cycles < 2:
-        return 0.0, 0.0
+        return 0.0, 1.0
     samples = max(len(stroke) // cycles, 4 * int(_SLOW))
     phase = np.arange(cycles * samples) / samples
     warped = np.interp(np.interp(phase, np.arange(cycles + 1), instants), time, stroke)

@@ -193,6 +193,8 @@ def _promising(here: SearchEnd, looks: Sequence[SearchEnd]) -> list[SearchEnd]:
 
 def _left(best: SearchEnd, here: SearchEnd, before: float, variance: float) -> bool:
     """Whether the look from an end, on a part of the samples, has left its minimum, within which both are alike."""
+    if not (best.finite and here.finite):
+        return False
     change = best.jacobian @ (here.values - best.values)
     return bool(change @ change > ELSEWHERE * max(before - here.squares, variance))
 
