@@ -115,8 +115,9 @@ def _scaled(where: str, values: np.ndarray, fields: Structure) -> tuple[np.ndarr
         ValueError: several fields that could be the scale, or one of several numbers.
     """
     factors, offsets = _scalars(fields, _FACTORS), _scalars(fields, _OFFSETS)
-    names = ", ".join((*factors, *offsets))
-    if len(factors) > 1 or len(offsets) > 1:
+    several = [f"{key} ({value.size} numbers)" for key, value in fields.items() if _scales(key) and _is_samples(value)]
+    names = ", ".join((*factors, *offsets, *several))
+    if len(factors) > 1 or len(offsets) > 1 or several:
         raise ValueError(f"{where}: which of {names} scales it is not clear. Export it in its unit, or with one scale.")
     scale, offset = next(iter(factors.values()), 1.0), next(iter(offsets.values()), 0.0)
     if (scale, offset) == (1.0, 0.0):
@@ -130,11 +131,14 @@ def _scaled(where: str, values: np.ndarray, fields: Structure) -> tuple[np.ndarr
 
 
 def _scalars(fields: Structure, keys: Sequence[str]) -> dict[str, float]:
-    """The fields of these names, in any case, that are one number, or several."""
+    """The fields of these names, in any case, that are one number."""
     found = {key: value for key, value in fields.items() if key.lower() in keys}
-    several = {key: value.ravel() for key, value in found.items() if _is_samples(value) and key.lower() not in _DATA}
-    lists = {f"{key}[{i}]": float(one) for key, value in several.items() for i, one in enumerate(value)}
-    return {key: float(value) for key, value in found.items() if isinstance(value, int | float)} | lists
+    return {key: float(value) for key, value in found.items() if isinstance(value, int | float)}
+
+
+def _scales(key: str) -> bool:
+    """Whether a field of this name scales the samples beside it."""
+    return key.lower() in (*_FACTORS, *_OFFSETS)
 
 
 def _named(fields: Structure, value: Untyped) -> list[RawColumn]:

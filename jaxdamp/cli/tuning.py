@@ -164,13 +164,13 @@ def tuning_arguments(
 def _limits(car: AbstractVehicle, metric: str, search: Call, *, white: bool) -> tuple[dict[str, Limit], list[str]]:
     """The limits given, that of the grip of the other wheels by default, and a remark on it."""
     limits, remarks = in_si(search.given.get("limits", {}), car, white=white)
-    wheels = [name for name in car.goal_metrics("grip", white=white) if name not in (*limits, metric)]
-    if wheels and not {"grip"} & {*limits, metric}:
-        every = len(wheels) == len(car.goal_metrics("grip", white=white))
-        limits |= dict.fromkeys(["grip"] if every else wheels, GRIP)
-        of = "of each tyre load" if every else f"of tyre loads: {', '.join(wheels)}"
-        sentence = f"Limited by default: grip (RMS variation {of}) to {GRIP} of the start"
-        remarks.append(f"{sentence}; --limit {'grip' if every else wheels[0]}=none removes it.")
+    every = car.goal_metrics("grip", white=white)
+    wheels = [name for name in every if name not in (*limits, metric)]
+    if wheels and "grip" not in (*limits, metric):
+        limits |= dict.fromkeys(["grip"] if wheels == every else wheels, GRIP)
+        of = "each tyre load" if wheels == every else f"the other tyre loads, {', '.join(wheels)}"
+        sentence = f"Limited by default: grip (RMS variation of {of}) to {GRIP} of the start"
+        remarks.append(f"{sentence}; --limit grip=none removes it.")
     return {name: limit for name, limit in limits.items() if limit is not None}, remarks
 
 

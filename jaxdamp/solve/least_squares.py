@@ -95,8 +95,9 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
 
     def __check_init__(self) -> None:
         lower, upper = (jtu.tree_leaves(side) for side in (self.lower, self.upper))
-        count = max(len(lower), len(upper))
-        for low, high in zip(lower * (count // len(lower)), upper * (count // len(upper)), strict=False):
+        if 1 in (len(lower), len(upper)):
+            lower, upper = lower * len(upper), upper * len(lower)
+        for low, high in zip(lower, upper, strict=False):
             ends = _checks.concrete(low), _checks.concrete(high)
             if ends[0] is not None and ends[1] is not None and np.any(ends[0] > ends[1]):
                 _checks.refuse("lower", "be at most `upper`", f"{low} above {high}")

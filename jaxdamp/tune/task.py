@@ -189,7 +189,7 @@ class DesignTask(Generic[V]):
         road = rides[0](design).road if white else None
         notes = stationary_notes(design, road) if isinstance(road, WhiteRoad) else []
         coarse = [[] if white else step_notes(self.vehicle, design, ride_of) for ride_of in rides]
-        notes += [note for of_ride in coarse for note in of_ride]
+        notes += dict.fromkeys(note for of_ride in coarse for note in of_ride)
         sound = [on for on, bad in zip(rides, coarse, strict=True) if not any("does not bear" in note for note in bad)]
         ranges, far = range_notes(self.vehicle, design, sound)
         return notes + ranges, far

@@ -59,7 +59,7 @@ def test_a_scale_beside_decimals_is_not_applied_and_several_are_refused(tmp_path
     assert any("channel 'F' as it stands: scale not applied" in note for note in run.notes)
     with pytest.raises(ValueError, match=r"a\.mat, channel 'F': which of scale, gain scales it is not clear"):
         read(saved(tmp_path, **with_counts(F.astype(np.int16), scale=0.05, gain=2.0)))
-    with pytest.raises(ValueError, match=r"which of scale\[0\], scale\[1\] scales it is not clear"):
+    with pytest.raises(ValueError, match=r"which of scale \(2 numbers\) scales it is not clear"):
         read(saved(tmp_path, **with_counts(F.astype(np.int16), scale=[0.05, 1.0])))
 
 

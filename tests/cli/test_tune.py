@@ -253,8 +253,14 @@ def test_a_limit_on_one_wheel_leaves_that_of_the_others() -> None:
     car, search = vehicles.presets.half_car_002(), Call("tune.minimise", {"limits": {FRONT: "+5%"}})
     limits, (remark,) = _limits(car, "comfort", search, white=False)
     assert limits == {FRONT: "+5%", "rms_rear_dynamic_tyre_load": "+10%"}
-    assert "of tyre loads: rms_rear_dynamic_tyre_load) to +10%" in remark
-    for given, expected in (({}, {"grip": "+10%"}), ({"grip": None}, {}), ({"grip": "+3%"}, {"grip": "+3%"})):
+    assert "of the other tyre loads, rms_rear_dynamic_tyre_load) to +10%" in remark
+    both = {FRONT: "+5%", "grip": None}
+    for given, expected in (
+        ({}, {"grip": "+10%"}),
+        ({"grip": None}, {}),
+        ({"grip": "+3%"}, {"grip": "+3%"}),
+        (both, {FRONT: "+5%"}),
+    ):
         assert _limits(car, "comfort", Call("tune.minimise", {"limits": given}), white=False)[0] == expected
 
 

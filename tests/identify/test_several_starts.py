@@ -73,7 +73,7 @@ def test_the_best_of_several_starts_is_followed_to_its_end(monkeypatch):
 
 
 @pytest.mark.parametrize("seed", [3, 28, 30])
-@pytest.mark.exhaustive_cases("3", "30")
+@pytest.mark.exhaustive_cases("3")
 def test_the_published_set_is_found(seed):
     """Of seed 28 the first start ends 180 in chi-square above the best, from where a part of the records leads on."""
     assert np.all(np.abs(errors(fit(Besinger, records(seed)), PUBLISHED)) < 3.0)
