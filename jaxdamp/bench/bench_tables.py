@@ -204,7 +204,8 @@ def _record(
         _refuse_signs(how, where)
         decision = signs.Decision(1.0, 1.0, ("positive stroke is rebound, as the file states",))
     else:
-        decision = signs.decide(time, stroke, force, how.sign, how.force_sign, where)
+        headers = _motion_headers(columns, channels)
+        decision = signs.decide(time, stroke, force, how.sign, how.force_sign, where, headers)
     if velocity is None or not (states_all or integrated):
         velocity, source = _velocity(time, stroke, velocity, where)
     temperature = channels.get("temperature")
@@ -246,6 +247,10 @@ def _commanded(
     if np.ptp(values) > 0.0:
         return None, values, conversion.si, []
     return float(values[0]), None, "", [f"command held at {values[0]:g} {conversion.si}, by its column"]
+
+
+def _motion_headers(columns: Mapping[str, Column], channels: Mapping[str, Samples]) -> list[str]:
+    return [columns[role].header for role in ("stroke", "velocity") if role in channels]
 
 
 def _refuse_signs(how: Interpretation, where: str) -> None:

@@ -5,10 +5,12 @@ from dataclasses import dataclass, field
 from typing import NoReturn
 
 import numpy as np
+from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
 from jaxdamp.bench.headers import NOT_MEASURED, ROLES, role_of, signal_unit, split_header, tail_unit, words_in
+from jaxdamp.bench.layout import GROUPED, PLAINLY
 from jaxdamp.bench.raw import Problems, RawColumn, RawTable
 from jaxdamp.bench.stamps import is_stamp
 from jaxdamp.bench.units import USUAL, Conversion, conversion, gain_conversion, named_conversion, ratio
@@ -223,7 +225,9 @@ def column_of(table: RawTable, role: str, index: int, choice: Choice) -> Column:
     if column.is_text:
         if role == "time":
             return Column(role, index, header, None)
-        raise ArgumentError(f"{where} ({role}) holds text ({np.asarray(column.values)[0]!r}), not numbers.")
+        text = str(np.asarray(column.values)[0])
+        how = f": {PLAINLY}" if GROUPED.fullmatch(text) else ""
+        raise ArgumentError(f"{where} ({role}) holds text ({text!r}), not numbers{how}.")
     name, written = split_header(column.name)
     tail = None if column.unit or written else tail_unit(name, role)
     stated = column.unit or written or ""
@@ -245,6 +249,25 @@ def column_of(table: RawTable, role: str, index: int, choice: Choice) -> Column:
         f'header: "{name} [{USUAL[role][0]}]".',
         example,
     )
+
+
+def numbers_of(table: RawTable, index: int) -> Float[np.ndarray, " points"]:
+    """A column as it stands, NaN where a cell is empty; text in it is refused."""
+    raw = table.columns[index]
+    wrong = {row: text for row, text in raw.faults.items() if text}
+    if wrong:
+        row, text = min(wrong.items())
+        where = f"{table.where}, {table.place(row)}, column {table.names[index]!r}"
+        raise ValueError(f"{where}: {text!r} is not a number. Mend or remove the line.")
+    return np.asarray(raw.values, np.float64)
+
+
+def in_si(table: RawTable, index: int, role: str, choice: Choice) -> tuple[Float[np.ndarray, " points"], str]:
+    """A column in SI, NaN where a cell is empty; and its unit."""
+    numbers = numbers_of(table, index)
+    column = column_of(table, role, index, choice)
+    assert column.conversion is not None
+    return column.conversion(numbers), column.unit
 
 
 def _refuse_missing(table: RawTable, role: str, columns: Mapping[str, Column | None]) -> NoReturn:

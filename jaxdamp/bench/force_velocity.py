@@ -3,6 +3,7 @@
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Unpack, final
 
 import numpy as np
@@ -33,9 +34,8 @@ from jaxdamp.bench.table_points import (
 from jaxdamp.dampers import AbstractDamper, FittedRange, Scheduled, SplineTable, Table as TableLaw, with_fitted_range
 
 
-_CYCLES, _SAMPLES = 3, 400  # of the motion of `runs`, samples in each cycle
+_SAMPLING_RATE = 100.0  # Hz, of the records of `runs`
 _LARGEST = 2**20  # bytes of a table
-_STROKE = 0.05  # m, from end to end
 
 
 @final
@@ -44,7 +44,7 @@ class ForceVelocityTable:
     """Forces over velocity of one setting or of several, as `bench.read_table` reads them.
 
     Attributes:
-        name: of the file.
+        name: of the file, or of all.
         curves: the points of each setting.
         notes: what was decided on units, sign and settings.
     """
@@ -98,12 +98,11 @@ class ForceVelocityTable:
         return {curve.setting: self.law(curve.setting) for curve in self.curves}
 
     def runs(self) -> BenchSet:
-        """Records to fit any law of the velocity to: a motion over all velocities with the forces of the table.
+        """Records to fit any law of the velocity to: one for each setting, with one sample for each point.
 
-        Each setting is moved through its velocities in half sines, rebound and compression; forces lie on straight
-        lines between the points. Only laws without hysteresis can be fitted, since a table says nothing of it.
+        Only laws without hysteresis can be fitted, since a table says nothing of it; its time and stroke are made up.
         """
-        return BenchSet(_motion(curve, self) for curve in self.curves)
+        return BenchSet(_record(curve, self) for curve in self.curves)
 
     def table(self) -> Table:
         """The forces, a row for each velocity and a column for each setting."""
@@ -140,23 +139,13 @@ def _range(curves: Sequence[Curve]) -> FittedRange:
     return FittedRange(velocity=(velocity.min(), velocity.max()), force=(force.min(), force.max()))
 
 
-def _motion(curve: Curve, table: ForceVelocityTable) -> BenchRun:
-    """A record of half sines of the velocity, up to the outermost points of the curve on both sides."""
-    up, down = float(curve.velocity[-1]), float(-curve.velocity[0])
-    shares = np.array([down, up]) / (up + down)  # of the period: the stroke there and back is the same
-    phase = (np.arange(_CYCLES * _SAMPLES) / _SAMPLES) % 1.0
-    out = phase < shares[0]
-    within = np.where(out, phase / shares[0], (phase - shares[0]) / shares[1])
-    velocity = np.where(out, up * np.sin(np.pi * within), -down * np.sin(np.pi * within))
-    period = 0.5 * np.pi * _STROKE / (up * shares[0])
-    place = 0.5 * _STROKE * np.cos(np.pi * within)
-    time = np.arange(len(phase)) * period / _SAMPLES
-    force = np.interp(velocity, curve.velocity, curve.force)
+def _record(curve: Curve, table: ForceVelocityTable) -> BenchRun:
+    """A record with one sample for each point, so that a fit knows no more than these, in the order of velocities."""
+    time = np.arange(len(curve.velocity)) / _SAMPLING_RATE
     name = f"{table.name}_{curve.setting}" if curve.setting else table.name
-    notes = ("a motion over the velocities of a force-velocity table, forces on straight lines between its points",)
-    return BenchRun.from_arrays(
-        name, time, np.where(out, -place, place), force, velocity, command=curve.command, notes=(*notes, *table.notes)
-    )
+    notes = ("the points of a force-velocity table, one sample each, in the order of their velocities", *table.notes)
+    v = curve.velocity
+    return BenchRun(name, time, v / _SAMPLING_RATE, v, curve.force, command=curve.command, notes=notes, of_points=True)
 
 
 @with_defaults(FILES)
@@ -178,7 +167,8 @@ def read_table(
     be named by the headers or by `units`.
 
     Arguments:
-        paths: a file or several, which are one table.
+        paths: a file or several, which are one table. Where two give the same setting and direction, the words in
+            which the names of the files differ are settings too.
         sign: "rebound-positive" or "compression-positive": the direction in which velocities, or else forces, are
             positive, where only their signs tell rebound from compression.
         side: of a table with one direction only: "rebound" or "compression", of which another file holds the other, or
@@ -235,7 +225,14 @@ def read_table(
     if how.sign is None and len(stated) == 1:
         how = replace(how, sign=stated.pop())
     curves, said = curves_of(sides, how)
-    return ForceVelocityTable(sheets[0].stem, curves, tuple(dict.fromkeys([*notes, *said])))
+    name, of_files = _called(sheets)
+    return ForceVelocityTable(name, curves, tuple(dict.fromkeys([*notes, *of_files, *said])))
+
+
+def _called(files: Sequence[Path]) -> tuple[str, list[str]]:
+    """The name of the table of these files, and a note where there are several."""
+    note = f"points of {', '.join(file.name for file in files)}"
+    return ", ".join(file.stem for file in files), [note] * (len(files) > 1)
 
 
 def are_tables(

@@ -17,6 +17,8 @@ _WORDS = {
 }
 _COMMANDS = {"current", "strom", "spulenstrom", "voltage", "spannung"}
 _OF_COMMANDS = {"coil", "valve", "damper", "mr", "solenoid", "measured", "actual", "ventil", "spule", "daempfer"}
+REBOUND = {"rebound", "reb", "extension", "droop", "zugstufe", "ausfederung"}
+COMPRESSION = {"compression", "bump", "jounce", "druckstufe", "einfederung"}
 NOT_MEASURED = {"setpoint", "command", "cmd", "demand", "target", "soll", "reference", "ref", "error"}
 
 
@@ -50,6 +52,17 @@ def words_in(name: str) -> list[str]:
     """The words of a name in lower case, also those that only their capitals set apart."""
     apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
     return [word.lower() for word in re.split(r"[^A-Za-zÀ-ÿ]+", apart) if word]
+
+
+def direction_of(header: str) -> int:
+    """The direction in which a header says that its column is positive: 1 rebound, -1 compression, 0 none or both.
+
+    >>> direction_of("bump travel [mm]"), direction_of("damper (compression negative) [mm]"), direction_of("stroke_mm")
+    (-1, 1, 0)
+    """
+    words = {*words_in(header)}
+    way = bool(words & REBOUND) - bool(words & COMPRESSION)
+    return -way if words & {"negative", "neg", "minus"} else way
 
 
 def role_of(header: str, unit: str = "") -> str | None:

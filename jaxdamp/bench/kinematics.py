@@ -12,12 +12,12 @@ from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
 from jaxdamp._files import FOLDER_SUFFIXES, find_files
 from jaxdamp.bench import sign as signs
-from jaxdamp.bench.columns import Choice, given_column
-from jaxdamp.bench.headers import split_header
+from jaxdamp.bench.columns import Choice, given_column, in_si, numbers_of
+from jaxdamp.bench.headers import direction_of, split_header
 from jaxdamp.bench.one_clock import main_tables
 from jaxdamp.bench.raw import RawTable
 from jaxdamp.bench.readers import READERS, read_tables
-from jaxdamp.bench.table_points import Points, in_si, numbers_of
+from jaxdamp.bench.table_points import Points
 from jaxdamp.bench.units import conversion
 from jaxdamp.dampers import AbstractDamper, Linkage
 
@@ -27,7 +27,6 @@ _WORDS = {  # the ratio first: "damper motion ratio" is one
     "damper": {"damper", "shock", "coilover", "strut", "dämpfer", "stoßdämpfer", "federbein"},
     "wheel": {"wheel", "jounce", "bump", "rebound", "droop", "rad", "radhub", "einfederung", "ausfederung"},
 }
-_BUMP, _REBOUND = {"jounce", "bump", "compression", "einfederung"}, {"rebound", "droop", "extension", "ausfederung"}
 _NO_UNITS = ("", "-", "1", "m/m", "mm/mm", "in/in")
 
 
@@ -162,13 +161,12 @@ def _role(table: RawTable, index: int) -> str | None:
 
 def _direction(table: RawTable, header: str, sign: str | None) -> tuple[float, str]:
     """The factor that brings a wheel travel to rebound positive, and why."""
-    stated = {factor for factor, own in ((-1.0, _BUMP), (1.0, _REBOUND)) if _words(header) & own}
     if sign is not None:
         return (-1.0 if sign == "compression-positive" else 1.0), f"wheel travel is {sign}, as it was said"
-    if len(stated) != 1:
+    way = direction_of(header)
+    if way == 0:
         signs.require(None, f"{table.where}, column {header!r}", "wheel travel", "header")
-    (factor,) = stated
-    return factor, f"wheel travel is {signs.SIGNS[int(factor < 0)]}, as its header says"
+    return float(way), f"wheel travel is {signs.SIGNS[way < 0]}, as its header says"
 
 
 def _ratios(table: RawTable, index: int) -> Points:

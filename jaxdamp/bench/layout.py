@@ -18,6 +18,9 @@ from jaxdamp.bench.units import is_unit, is_usual
 
 DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "white space", "|": "vertical bar"}
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*([eEdD][+-]?\d+)?|\.\d+([eEdD][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
+# A number with a decimal comma or with thousands set apart, in a cell that holds more than a number as it is read.
+GROUPED = re.compile(r"[+-]?\d+(?:,\d+|(?:[ '\u2019\u00a0\u202f]\d{3})+)(?:[.,]\d+)*")
+PLAINLY = "export the file with decimal points and without a sign for thousands"
 _DIGIT = re.compile(r"\d")
 _NUMERIC = 0.9  # share of numbers that makes a column one of the record rather than one with gaps
 Rows = Sequence[tuple[int, list[str]]]  # number of the line, from 1, and its cells
@@ -82,7 +85,9 @@ class Layout:
 
     def is_row(self, cells: Sequence[str]) -> bool:
         """Whether this is a row of the record, with perhaps a value that is wrong."""
-        return 2 * self.values_in(cells) > len(self.full) or self.values_in(cells) >= 2
+        good = self.values_in(cells)
+        wrong = [i for i in self.full if good and GROUPED.fullmatch(cells[i]) and not self.has_value(cells[i])]
+        return 2 * (good + len(wrong)) > len(self.full) or good + len(wrong) >= 2
 
 
 def layout_of(rows: Rows, delimiter: str) -> Layout | None:

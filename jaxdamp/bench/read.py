@@ -55,7 +55,8 @@ def read(
     Arguments:
         paths: a file, several, a pattern such as "runs/*.csv", or a folder.
         sign: "rebound-positive" or "compression-positive", the direction in which the files count positive. Without
-            it, positive is taken as rebound, and the record says so.
+            it the header of stroke or velocity says it ("compression travel"), or positive is taken as rebound; the
+            record says so.
         force_sign: "same" if the files' force is positive when it resists motion in the positive direction,
             "opposite" if it is negative then. Without it: the same if `sign` is given, otherwise what makes the work
             per cycle positive, because a damper takes in energy.

@@ -56,6 +56,7 @@ class BenchRun:
         stroke_is_integrated: the stroke was integrated from the velocity, so that its zero is the middle of the motion
             and no place in the damper.
         units: of the numbers in the file, by channel, as they were stated and brought to SI; empty for other records.
+        of_points: each sample is a point of a force-velocity table and stands for itself; time and stroke are made up.
 
     Raises:
         ValueError: channels of different lengths, fewer than 20 samples, NaN, time not uniform, constant stroke; a
@@ -83,6 +84,7 @@ class BenchRun:
     command_channel: Float[np.ndarray, " time"] | None = None
     command_unit: str = ""
     units: Mapping[str, str] = field(default_factory=dict)
+    of_points: bool = False
     _origin: Origin | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
@@ -101,7 +103,8 @@ class BenchRun:
         if self.command_channel is not None:
             _checks.one_of("command_unit", self.command_unit, COMMAND_UNITS)
         object.__setattr__(self, "notes", tuple(self.notes))
-        clock.check_count(len(self.time), where)
+        if not self.of_points:
+            clock.check_count(len(self.time), where)
         clock.check_time(self.time, where)
         clock.check_stroke(self.stroke, where)
 

@@ -1,17 +1,20 @@
 """Which direction of a file is rebound, and whether its force resists or pushes.
 
 The work of a passive damper over a cycle is positive, ∮ F dx > 0, so a record shows whether force and stroke agree in
-sign. Which of the two directions is rebound no work can show: turning both leaves it as it is. That is either given,
-or taken as rebound positive and said so.
+sign. Which of the two directions is rebound no work can show: turning both leaves it as it is. That is given, or stated
+by the header of the stroke or of the velocity, or taken as rebound positive and said so.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NoReturn
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
+from jaxdamp.bench.headers import direction_of
 from jaxdamp.bench.motion import Samples, cycle_instants, cycle_works
 
 
@@ -85,31 +88,68 @@ def _there_and_back(time: Samples, stroke: Samples) -> Float[np.ndarray, " insta
 
 
 def decide(
-    time: Samples, stroke: Samples, force: Samples, sign: str | None, force_sign: str | None, where: str
+    time: Samples,
+    stroke: Samples,
+    force: Samples,
+    sign: str | None,
+    force_sign: str | None,
+    where: str,
+    headers: Sequence[str] = (),
 ) -> Decision:
     """How the channels of a file have to be turned, by what is given (as for `bench.read`) and by the work.
 
+    `headers` are those of stroke and velocity, which may state what is not given, such as "compression travel".
+
     Raises:
-        ValueError: what is given contradicts the work, or nothing is given and the work is too small to decide.
+        ValueError: what is given contradicts the work or a header, or nothing is given and the work is too small to
+            decide.
     """
     check_words(sign, force_sign)
+    stated, header = _stated(headers, sign, where)
     work, loss = loss_fraction(time, stroke, force)
     clear = abs(loss) >= LEAST_LOSS
     done = f"work per cycle {work:+.4g} J"
     known = f"the {done} is only {abs(loss):.1%} of that of a damper with this force and stroke"
     doubt = known if np.isfinite(work) else "the stroke does not come back: its work may be that of a spring or of gas"
     if sign is None and force_sign is None and not clear:
-        ways = [Setting("sign", word) for word in SIGNS]
-        raise ArgumentError(
-            f"{where}: the sign convention cannot be established from the data, because {doubt}. Pass {ways[0]} or "
-            f"{ways[1]}.",
-            *ways,
-        )
+        _refuse_unclear(doubt, stated, where)
     if clear:
         _refuse_contradiction(loss, sign, force_sign, f"{where}: ", done)
     turned = force_sign == "opposite" or (force_sign is None and sign is None and loss < 0)
-    motion = -1.0 if sign == "compression-positive" else 1.0
-    return Decision(motion, -motion if turned else motion, _explain(sign, turned, done, "" if clear else doubt))
+    motion = -1.0 if (sign or stated) == "compression-positive" else 1.0
+    notes = (
+        _of_force(turned, done, "" if clear else doubt),
+        _of_motion(sign or stated, header if sign is None else ""),
+    )
+    return Decision(motion, -motion if turned else motion, notes)
+
+
+def _stated(headers: Sequence[str], sign: str | None, where: str) -> tuple[str | None, str]:
+    """The sign that headers state, and one that does; refused where they state both, or another one is given."""
+    said = {SIGNS[direction_of(header) < 0]: header for header in headers if direction_of(header)}
+    if len(said) > 1:
+        without = Setting("columns", {"velocity": None})
+        names = " and ".join(map(repr, said.values()))
+        raise ArgumentError(
+            f"{where}: columns {names} are positive in opposite directions, as their headers say. Mend one of them, or "
+            f"derive the velocity from the stroke: {without}.",
+            without,
+        )
+    stated, header = next(iter(said.items()), (None, ""))
+    if stated and sign not in (None, stated):
+        given = Setting("sign", sign)
+        raise ArgumentError(
+            f"{where}: {given} contradicts the header {header!r}, which says {stated}. Leave it out, or mend the "
+            "header.",
+            given,
+        )
+    return stated, header
+
+
+def _refuse_unclear(doubt: str, stated: str | None, where: str) -> NoReturn:
+    ways = [Setting("sign", word) for word in SIGNS if stated in (None, word)]
+    said = f"{where}: the sign convention cannot be established from the data, because {doubt}"
+    raise ArgumentError(f"{said}. Pass {' or '.join(map(str, ways))}.", *ways)
 
 
 def _refuse_contradiction(loss: float, sign: str | None, force_sign: str | None, where: str, done: str) -> None:
@@ -133,21 +173,18 @@ def _refuse_contradiction(loss: float, sign: str | None, force_sign: str | None,
         )
 
 
-def _explain(sign: str | None, turned: bool, work: str, doubt: str) -> tuple[str, ...]:
-    notes = []
+def _of_force(turned: bool, work: str, doubt: str) -> str:
     if turned:
-        notes.append(f"{OPPOSITE} ({doubt or work}): force turned")
-    elif doubt:
-        notes.append(f"force and stroke of the file taken to agree in sign: {doubt}")
-    else:
-        notes.append(f"force and stroke of the file agree in sign ({work})")
+        return f"{OPPOSITE} ({doubt or work}): force turned"
+    if doubt:
+        return f"force and stroke of the file taken to agree in sign: {doubt}"
+    return f"force and stroke of the file agree in sign ({work})"
+
+
+def _of_motion(sign: str | None, header: str) -> str:
     if sign is None:
-        notes.append(
-            "positive stroke taken as rebound: if the bench counts compression positive, pass "
-            'sign="compression-positive"'
-        )
-    elif sign == "rebound-positive":
-        notes.append("positive stroke is rebound, as given")
-    else:
-        notes.append("positive stroke is compression, as given: stroke, velocity and force turned")
-    return tuple(notes)
+        other = Setting("sign", "compression-positive")
+        return f"positive stroke taken as rebound: if the bench counts compression positive, pass {other}"
+    why = f"as the header {header!r} says" if header else "as given"
+    turned = ": stroke, velocity and force turned" if sign == "compression-positive" else ""
+    return f"positive stroke is {sign.removesuffix('-positive')}, {why}{turned}"

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -11,16 +12,16 @@ from jaxtyping import Float
 from jaxdamp._checks import ArgumentError, Setting
 from jaxdamp._files import natural_key
 from jaxdamp.bench import sign as signs
-from jaxdamp.bench.columns import Choice, column_of, find_one
-from jaxdamp.bench.headers import role_of, split_header
+from jaxdamp.bench.columns import Choice, find_one, in_si
+from jaxdamp.bench.headers import COMPRESSION, REBOUND, role_of, split_header, tail_unit
 from jaxdamp.bench.raw import Problems, RawColumn, RawTable
 from jaxdamp.bench.settings import settings_in_name
 
 
 Directions = dict[int, dict[str, list[np.ndarray]]]  # points by direction and setting
 SIDES = ("rebound", "compression", "symmetric")
-_REBOUND = {"rebound", "reb", "extension", "ext", "tension", "zug", "zugstufe", "r"}
-_COMPRESSION = {"compression", "comp", "bump", "jounce", "druck", "druckstufe", "c"}
+_REBOUND = REBOUND | {"ext", "tension", "zug", "r"}
+_COMPRESSION = COMPRESSION | {"comp", "druck", "c"}
 _SETTING = {"setting", "settings", "click", "clicks", "clk", "position", "adjuster", "current", "valve", "turns"}
 _DIRECTION = {"direction", "side", "stage"}
 _MOST_ROWS = 5000  # of a table; more is a record
@@ -44,13 +45,18 @@ class Curve(NamedTuple):
 
 
 class Side(NamedTuple):
-    """Points of one column and setting; direction is 1 in rebound, -1 in compression, 0 where signs say it."""
+    """Points of one column and setting; direction is 1 in rebound, -1 in compression, 0 where signs say it.
+
+    `by_name` is true where not the header but the name of the file or sheet says the direction.
+    """
 
     setting: str
     direction: Points
     velocity: Points
     force: Points
     where: str
+    file: Path
+    by_name: bool = False
 
 
 @dataclass(frozen=True)
@@ -102,9 +108,14 @@ def _direction(text: str) -> int:
     return int(bool(words & _REBOUND)) - int(bool(words & _COMPRESSION))
 
 
-def _direction_of_name(name: str) -> int:
-    """The direction that a name states, in which a letter beside digits is part of a type or of an adjuster."""
-    return _direction(re.sub(r"(?i)[rc] ?-?\d+|\d[rc](?![a-z])", " ", name))
+def _direction_of_name(table: RawTable, velocity: Points) -> int:
+    """The direction that the name of a file or sheet states; none for velocities of both signs, where R may be right.
+
+    A letter beside digits is part of a type or of an adjuster.
+    """
+    if np.any(velocity < 0.0) and np.any(velocity > 0.0):
+        return 0
+    return _direction(re.sub(r"(?i)[rc] ?-?\d+|\d[rc](?![a-z])", " ", f"{table.file.stem} {table.record}"))
 
 
 def _setting(text: str) -> str:
@@ -112,7 +123,9 @@ def _setting(text: str) -> str:
     found = settings_in_name(text)
     if len(found) == 1:
         return f"{next(iter(found.values())):g}"
-    name = split_header(text)[0]
+    name, unit = split_header(text)
+    tail = None if unit else tail_unit(name, "force")
+    name = tail[0] if tail else name
     if found:
         spelled = rf"(?i)\b(?:{'|'.join(word for word in _REBOUND | _COMPRESSION if len(word) > 1)})\b"
         return re.sub(spelled, "", name).strip(" _-,:")
@@ -153,13 +166,14 @@ def sides_of(table: RawTable, how: How) -> tuple[list[Side], list[str]]:
     words = _column_of_words(table, _DIRECTION, [at, *forces])
     velocity, unit = in_si(table, at, "velocity", how.choice)
     units, found, problems, missing = {"velocity": unit}, [], Problems(), 0
-    name = f"{table.file.stem} {table.record}"
+    of_name = _direction_of_name(table, velocity)
     for index in forces:
         with problems.collected():
             force, units["force"] = in_si(table, index, "force", how.choice)
             there = np.isfinite(velocity) & np.isfinite(force)
             missing += int(np.sum(~there))
-            direction = np.full(len(velocity), _direction(table.names[index]) or _direction_of_name(name), dtype=float)
+            of_header = _direction(table.names[index])
+            direction = np.full(len(velocity), of_header or of_name, dtype=float)
             if words is not None:
                 direction = np.array([_direction(str(cell)) for cell in table.columns[words].values], dtype=float)
             settings = np.full(len(velocity), _setting(table.names[index]) or _setting(table.record), dtype=object)
@@ -168,7 +182,8 @@ def sides_of(table: RawTable, how: How) -> tuple[list[Side], list[str]]:
             where = f"{table.where}, column {table.names[index]!r}"
             for setting in dict.fromkeys(settings.tolist()):
                 rows = there & (settings == setting)
-                found.append(Side(setting, direction[rows], velocity[rows], force[rows], where))
+                channels = direction[rows], velocity[rows], force[rows]
+                found.append(Side(setting, *channels, where, table.file, of_header == 0 and words is None))
     problems.raise_any()
     read = ", ".join(f"{role} in {text}" for role, text in units.items())
     lost = [f"left out: {missing} cell{'s' * (missing > 1)} of velocity or force without a number"] * bool(missing)
@@ -179,74 +194,88 @@ def _cell(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def numbers_of(table: RawTable, index: int) -> Points:
-    """A column as it stands, NaN where a cell is empty; text in it is refused."""
-    raw = table.columns[index]
-    wrong = {row: text for row, text in raw.faults.items() if text}
-    if wrong:
-        row, text = min(wrong.items())
-        where = f"{table.where}, {table.place(row)}, column {table.names[index]!r}"
-        raise ValueError(f"{where}: {text!r} is not a number. Mend or remove the line.")
-    return np.asarray(raw.values, np.float64)
-
-
-def in_si(table: RawTable, index: int, role: str, choice: Choice) -> tuple[Points, str]:
-    """A column in SI, NaN where a cell is empty; and its unit."""
-    numbers = numbers_of(table, index)
-    column = column_of(table, role, index, choice)
-    assert column.conversion is not None
-    return column.conversion(numbers), column.unit
-
-
 def curves_of(sides: Sequence[Side], how: How) -> tuple[tuple[Curve, ...], list[str]]:
     """The points by setting, both directions joined, and notes."""
     notes: list[str] = []
     points: Directions = {1: {}, -1: {}}
-    columns: dict[tuple[str, str, int], str] = {}
-    for side in sides:
-        velocity, force = _oriented(side, how, notes)
-        for direction, there in ((1, ~np.signbit(velocity)), (-1, np.signbit(velocity))):  # −0.0 is of compression
-            if there.any():
-                _once(side, direction, columns)
-                points[direction].setdefault(side.setting, []).append(np.stack([velocity[there], force[there]]))
+    for direction, side in _apart(_halves(sides, how, notes)):
+        points[direction].setdefault(side.setting, []).append(np.stack([side.velocity, side.force]))
     for direction, word in ((1, "rebound"), (-1, "compression")):
         if not points[direction]:
             _refuse_half(sides[0].where, word)
         _share(points[direction], points[-direction], word, notes)
     if all(np.all(side.force >= 0.0) or np.all(side.force <= 0.0) for side in sides):
-        _rest(points[1].values(), notes)
+        _rest(points, notes)
     names = sorted({*points[1], *points[-1]}, key=natural_key)
     lacking = [name for name in names if name not in points[1] or name not in points[-1]]
     if lacking:
         raise ValueError(f"{sides[0].where}: {', '.join(map(repr, lacking))} is there in one direction only.")
     curves = [_curve(name, [*points[-1][name], *points[1][name]], notes) for name in names]
-    notes += [f"{len(curves)} settings, by columns, rows or sheets: {', '.join(names)}"] * (len(curves) > 1)
+    notes += [f"{len(curves)} settings, by columns, rows, sheets or files: {', '.join(names)}"] * (len(curves) > 1)
     return tuple(sorted(curves, key=_command)), notes
 
 
-def _once(side: Side, direction: int, columns: dict[tuple[str, str, int], str]) -> None:
-    """Refuse two columns of a table that give the same setting and direction."""
-    table, column = side.where.rsplit(", column ", 1)
-    key = table, side.setting, direction
-    if key in columns:
-        way, setting = "rebound" if direction > 0 else "compression", f" at {side.setting!r}" if side.setting else ""
-        raise ValueError(
-            f"{table}: columns {columns[key]} and {column} both give the force in {way}{setting}. Name a setting in "
-            "each header, such as `4 clicks`, or keep one of them."
-        )
-    columns[key] = column
+def _halves(sides: Sequence[Side], how: How, notes: list[str]) -> list[tuple[int, Side]]:
+    """The points in rebound (1) and in compression (-1) of each column, positive in rebound."""
+    halves = []
+    for side in sides:
+        velocity, force = _oriented(side, how, notes)
+        for direction, there in ((1, ~np.signbit(velocity)), (-1, np.signbit(velocity))):  # −0.0 is of compression
+            if there.any():
+                halves.append((direction, side._replace(velocity=velocity[there], force=force[there])))
+    return halves
+
+
+def _apart(halves: list[tuple[int, Side]]) -> list[tuple[int, Side]]:
+    """The points with the names of files as settings where these give the same ones; refused if that does not help."""
+    files: dict[tuple[int, str], set[Path]] = {}
+    for direction, side in halves:
+        if np.any(side.velocity):
+            files.setdefault((direction, side.setting), set()).add(side.file)
+    if any(len(same) > 1 for same in files.values()):
+        names = {file: re.split(r"[_\s]+", file.stem) for same in files.values() for file in same}
+        common = set.intersection(*map(set, names.values()))
+        own = {file: [word for word in words if word not in common] for file, words in names.items()}
+        names = own if all(own.values()) else names
+        halves = [(way, side._replace(setting=_in_file(names[side.file], side))) for way, side in halves]
+    seen: dict[tuple[int, str], str] = {}
+    for direction, side in halves:
+        if np.any(side.velocity):  # a point at rest may stand in both directions
+            _once(side, direction, seen.setdefault((direction, side.setting), side.where))
+    return halves
+
+
+def _in_file(words: Sequence[str], side: Side) -> str:
+    """The setting of a column by the words of its file's name, but for those of direction, and by its header."""
+    other = _REBOUND | _COMPRESSION | _SETTING if np.all(side.direction != 0.0) else _SETTING
+    text = " ".join(word for word in words if word.lower() not in other)
+    return " ".join(filter(None, [_setting(text) if settings_in_name(text) else text, side.setting]))
+
+
+def _once(side: Side, direction: int, first: str) -> None:
+    """Refuse a column that gives the same setting and direction as the first one that does."""
+    if side.where == first:
+        return
+    way, setting = "rebound" if direction > 0 else "compression", f" at {side.setting!r}" if side.setting else ""
+    (table, column), (other, before) = side.where.rsplit(", column ", 1), first.rsplit(", column ", 1)
+    both = f"{table}: columns {before} and {column}" if table == other else f"{first} and {side.where}"
+    names = "" if table == other else "or in the names of files and sheets, "
+    raise ValueError(
+        f"{both} both give the force in {way}{setting}. Name a setting in each header, such as `4 clicks`, {names}"
+        "or keep one of them."
+    )
 
 
 def _command(curve: Curve) -> float:
     return np.inf if curve.command is None else curve.command
 
 
-def _rest(settings: Iterable[list[np.ndarray]], notes: list[str]) -> None:
+def _rest(points: Directions, notes: list[str]) -> None:
     """A point of no force at zero velocity, for settings that have none there."""
-    for parts in settings:
-        if not any(np.any(part[0] == 0.0) for part in parts):
+    for setting, parts in points[1].items():
+        if not any(np.any(part[0] == 0.0) for part in [*parts, *points[-1].get(setting, [])]):
             parts.append(np.zeros((2, 1)))
-    notes.append("no force at rest, since forces are given as magnitudes by direction")
+            notes.append("no force at rest, since forces are given as magnitudes by direction")
 
 
 def _share(own: dict[str, list[np.ndarray]], others: Iterable[str], word: str, notes: list[str]) -> None:
@@ -273,7 +302,12 @@ def _oriented(side: Side, how: How, notes: list[str]) -> tuple[Points, Points]:
     both = bool(np.any(force < 0.0) and np.any(force > 0.0))
     if np.all(side.direction != 0.0):
         if any(np.ptp(np.sign(force[(side.direction == d) & (force != 0.0)])) > 0 for d in set(side.direction)):
-            raise ValueError(f"{side.where} has forces of both signs in one direction: subtract the gas force.")
+            said = "rebound" if np.all(side.direction > 0.0) else "compression"
+            name = f", which the name of its file or sheet says is {said}" * side.by_name
+            other = ", or rename it" * side.by_name
+            raise ValueError(
+                f"{side.where} has forces of both signs in one direction{name}: subtract the gas force{other}."
+            )
         notes.append("rebound and compression as headers or names say")
         return np.abs(velocity) * side.direction, np.abs(force) * side.direction
     if np.any(velocity < 0.0):

@@ -14,11 +14,14 @@ from jaxdamp._files import check_size
 from jaxdamp.bench.blocks import blocks_of, named_apart, title
 from jaxdamp.bench.layout import (
     DELIMITERS,
+    GROUPED,
     PLAIN_COMMA,
+    PLAINLY,
     Header,
     Layout,
     columns_of,
     header_of,
+    is_number,
     layout_of,
     split,
 )
@@ -28,6 +31,7 @@ from jaxdamp.bench.raw import RawColumn, RawTable
 _LOOK_AT = 2000  # lines that decide on the delimiter
 _MOST_COLUMNS = 4096  # of a text file
 _CHUNK = 5_000  # lines that are divided at a time, to bound the memory
+_MINUS = re.compile(r"(?<![A-DF-Za-df-z])\u2212(?=[\d.,])")  # as spreadsheets write it; not that of "s−1"
 _CONTENT = {  # how files of other formats begin
     b"PK\x03\x04": "an XLSX workbook (.xlsx)",
     b"MATLAB": "a MATLAB file (.mat)",
@@ -102,15 +106,20 @@ def text_lines(file: Path) -> list[str]:
     check_size(file, file.stat().st_size)
     raw = file.read_bytes()
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return raw.decode("utf-16", errors="replace").splitlines()
+        return _with_minus(raw.decode("utf-16", errors="replace")).splitlines()
     other = next((name for begin, name in _CONTENT.items() if raw.startswith(begin)), None)
     if other or b"\0" in raw[:4096]:
         kind = f"it looks like {other}: give it that ending" if other else "its format is unknown"
         raise ValueError(f"{file} is not a text file; {kind}, or export it from the bench software as CSV.")
     try:
-        return raw.decode("utf-8-sig").splitlines()
+        return _with_minus(raw.decode("utf-8-sig")).splitlines()
     except UnicodeDecodeError:
         return raw.decode("cp1252", errors="replace").splitlines()
+
+
+def _with_minus(text: str) -> str:
+    """The text with ASCII signs before its numbers."""
+    return _MINUS.sub("-", text) if "\u2212" in text else text
 
 
 def _choose(file: Path, top: list[tuple[int, str]], given: str | None) -> Layout:
@@ -131,9 +140,16 @@ def _choose(file: Path, top: list[tuple[int, str]], given: str | None) -> Layout
     if not kind and any(_layouts(top, candidates).values()):
         raise ValueError(
             f"{file} has only one column of numbers: a record needs at least the stroke and the force, side by side, "
-            "divided by comma, semicolon, tab, white space or vertical bar."
+            f"divided by comma, semicolon, tab, white space or vertical bar.{_grouped(top)}"
         )
-    raise ValueError(f"{file} holds no rows of numbers: its first line is {top[0][1][:80]!r}.{kind}")
+    raise ValueError(f"{file} holds no rows of numbers: its first line is {top[0][1][:80]!r}.{kind}{_grouped(top)}")
+
+
+def _grouped(top: list[tuple[int, str]]) -> str:
+    """A sentence on the first cell with a decimal comma or thousands that its file cannot have."""
+    cells = ((n, cell, d) for n, line in top for d in DELIMITERS if d != " " and d in line for cell in split(line, d))
+    found = ((n, cell) for n, cell, d in cells if GROUPED.fullmatch(cell) and not is_number(cell, d))
+    return next((f" Line {n} has {cell!r}, which is not read as a number: {PLAINLY}." for n, cell in found), "")
 
 
 def _divides(delimiter: str, top: list[tuple[int, str]]) -> bool:

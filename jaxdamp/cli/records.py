@@ -84,9 +84,10 @@ class Reading:
         return runs.process(**steps) if steps else runs
 
     def checked(self, screen: Screen, runs: BenchSet, *, refuse: bool = False) -> tuple[BenchSet, Preflight]:
-        """The records without an error, and the findings on all of them but those on rest that is cut off."""
+        """The records without an error, and the findings on all of them but those that the processing answers."""
+        answered = (() if self.keep_rest else _CUT_OFF) + (("delay",) if "delay" in self.steps.given else ())
         with screen.stage("Checking the records"):
-            found = bench.preflight(runs).without(() if self.keep_rest else _CUT_OFF)
+            found = bench.preflight(runs).without(answered)
         self._show(screen, found)
         if self.keep_bad:
             return runs, found

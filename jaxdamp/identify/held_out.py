@@ -79,10 +79,17 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
         models, told = _predicting(_refitted(start, factor), fitted, part, result)
         samples += compared(models, problem.runs, problem.initial_state, parts, told)
     beyond = _beyond(result, fitted, unreached) if samples else []
-    words = f"each of {len(runs)} records" if whole else f"each quarter of the record{'s' * (len(runs) > 1)}"
-    words += " predicted by fits without it" + ", all of one motion" * (len(groups) == 1)
+    words = f"each of {len(runs)} records predicted by fits without it" if whole else _quarters(runs, alike=len(groups) == 1)
     words += ", velocities that no other reaches by the fit of all" * bool(beyond)
     return _together([*samples, *beyond], words)
+
+
+def _quarters(runs: Sequence[BenchRun], *, alike: bool) -> str:
+    """What was predicted from what, in words, where parts of records of one motion or of several are left out."""
+    if all(run.of_points for run in runs):
+        return "each quarter of the points predicted by fits without it"
+    words = f"each quarter of the record{'s' * (len(runs) > 1)} predicted by fits without it"
+    return words + ", all of one motion" * alike
 
 
 def _as_wholes(result: FitResult, problem: Problem, groups: Sequence[Sequence[int]]) -> bool:
@@ -145,8 +152,10 @@ def motions(runs: Sequence[BenchRun]) -> list[list[int]]:
 def in_time_parts(run: BenchRun) -> Iterator[Bool[np.ndarray, " samples"]]:
     """The samples of each of four parts of a record: its quarters, or slices in turn where it has few cycles.
 
-    Rest before and after the motion belongs to the nearest part.
+    Rest before and after the motion belongs to the nearest part. Of the points of a table every fourth is left out.
     """
+    if run.of_points:
+        return (np.arange(len(run)) % PARTS == part for part in range(PARTS))
     moving = moving_samples(run)
     count = moving.stop - moving.start
     slices = PARTS if count / run.sampling_rate * run.frequency >= PARTS else PARTS * SLICES

@@ -42,7 +42,7 @@ class Cycle(NamedTuple):
 def moving_samples(run: BenchRun) -> slice:
     """The samples between rest before and rest after the motion."""
     if run not in _moving:
-        _moving[run] = moving_part(run)
+        _moving[run] = slice(0, len(run)) if run.of_points else moving_part(run)
     return _moving[run]
 
 

@@ -64,7 +64,7 @@ def records_of(problem: Problem, best: SearchEnd) -> Iterator[Record]:
     place = np.cumsum(problem.used) - 1
     for i, run in enumerate(problem.runs):
         at = np.flatnonzero((problem.owner == i) & problem.used)
-        if at.size < FEWEST:
+        if at.size < FEWEST or run.of_points:  # points of a table, on no machine, are too few for a pattern
             continue
         step = problem.sample_steps[i]
         time = step * np.arange(at.size)

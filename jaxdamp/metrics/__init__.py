@@ -91,7 +91,15 @@ from jaxdamp.metrics.roughness_index import (
     international_roughness_index,
 )
 from jaxdamp.metrics.spectrum import coherence, power_spectral_density, transmissibility
-from jaxdamp.metrics.statistics import STATISTICS, Gathered as Gathered, Reduction, Statistic, Term, percentile
+from jaxdamp.metrics.statistics import (
+    STATISTICS,
+    Gathered as Gathered,
+    Reduction,
+    Statistic,
+    Term,
+    lift_off_below as lift_off_below,
+    percentile,
+)
 from jaxdamp.metrics.tyre_load import (
     aggregate_force,
     aggregate_force_percentile,

@@ -194,9 +194,29 @@ def _stress(deviation: Scalar) -> Scalar:
     return 1.0 + 6.0 * deviation**2 + 3.0 * deviation**4
 
 
-def _lifted(y: Samples, _: Scalar | None) -> Samples:
-    lifted = y <= -1.0 + max(1e-9, _ROUNDING * float(jnp.finfo(y.dtype).eps))
-    return jnp.where(jnp.isnan(y), y, lifted.astype(y.dtype))
+@dataclasses.dataclass(frozen=True)
+class _Lifted:
+    """1 where the load is at most this share of the static load, 0 elsewhere; equal for an equal share."""
+
+    share: float
+
+    def __call__(self, y: Samples, _: Scalar | None) -> Samples:
+        lifted = y <= -1.0 + max(self.share, 1e-9, _ROUNDING * float(jnp.finfo(y.dtype).eps))
+        return jnp.where(jnp.isnan(y), y, lifted.astype(y.dtype))
+
+
+def _mean(gathered: Gathered, count: int, _: ScalarLike) -> Scalar:
+    return gathered[0] / count
+
+
+def lift_off_below(share: float) -> Statistic:
+    """The part of the time in which the load of a tyre is at most a share of its static load [-], from 0 to 1.
+
+    Arguments:
+        share: 0 for a linear tyre; what a tyre that can lift off still carries where its contact ends.
+    """
+    terms = (Term(Reduction.SUM, _Lifted(share)),)
+    return Statistic("lift_off_fraction", terms, _mean, unit=_dimensionless, differentiable=False)
 
 
 def _power(gathered: Gathered, count: int, _: ScalarLike) -> Scalar:
@@ -241,7 +261,7 @@ _ALL = (
         lambda gathered, *_: gathered[1] - gathered[0],
     ),
     Statistic("standard_deviation", _SPREAD, _deviation, of_rms=_itself),
-    Statistic("mean", (Term(Reduction.SUM),), lambda gathered, count, _: gathered[0] / count, signed=True),
+    Statistic("mean", (Term(Reduction.SUM),), _mean, signed=True),
     Statistic(
         "road_stress_factor",
         _SPREAD,
@@ -249,13 +269,7 @@ _ALL = (
         unit=_dimensionless,
         of_rms=_stress,
     ),
-    Statistic(
-        "lift_off_fraction",
-        (Term(Reduction.SUM, _lifted),),
-        lambda gathered, count, _: gathered[0] / count,
-        unit=_dimensionless,
-        differentiable=False,
-    ),
+    lift_off_below(0.0),
     Statistic(
         "dissipated_power",
         (Term(Reduction.SUM), Term(Reduction.FIRST), Term(Reduction.LAST)),
@@ -271,7 +285,8 @@ _ALL = (
     Statistic("max_transient_value", of_record=lambda record, dt: max_transient_value(record, dt, None)),
 )
 # By name. `lift_off_fraction` and `road_stress_factor` are of a tyre's load beyond its static load over its static
-# load; `dissipated_power` is of the product of a force and its velocity, of another channel its mean.
+# load, the former of a linear tyre; `dissipated_power` is of the product of a force and its velocity, of another
+# channel its mean.
 STATISTICS: dict[str, Statistic] = {statistic.name: statistic for statistic in _ALL}
 
 

@@ -63,8 +63,9 @@ def lift_off_fraction(tyre_load: SignalLike, threshold: ScalarLike | int = 0.0) 
 
     Arguments:
         tyre_load: total tyre load, static part included [N], shape [time]; positive presses on the road.
-        threshold: the load [N] that counts as lifted off; give a small positive one for a tyre model with a smooth
-            lift-off.
+        threshold: the load [N] that counts as lifted off: 0 for a linear tyre. A tyre with `tyre_lifts=True`, whose
+            load is rounded there, still carries 0.007 (exactly 0.01 ln 2) of its static load where its contact ends:
+            give that, as the ride metrics do.
 
     Raises:
         ValueError: if the signal is empty or has more than one axis, or `threshold` is not finite.

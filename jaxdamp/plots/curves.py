@@ -140,14 +140,17 @@ def _range(runs: Sequence[BenchRun]) -> tuple[float, float]:
 
 
 def _measured(axes: Axes, runs: Sequence[BenchRun]) -> list:
-    """Samples as a cloud and peak-velocity points as rings; the handles for the legend."""
+    """Samples as a cloud, points at peak velocity or of a table as rings; the handles for the legend."""
     if not runs:
         return []
+    look: _style.Look = {"color": _style.BLACK, "markerfacecolor": "white", "markersize": 4.5, "zorder": 3}
+    if all(run.of_points for run in runs):
+        velocity, force = np.concatenate([np.stack([run.velocity, run.force]) for run in runs], axis=1)
+        return axes.plot(velocity, force, "o", label="points of the table", **look)
     cycles = [np.stack([run.velocity, run.force])[:, last_steady_cycle(run)] for run in runs]
     velocity, force = np.concatenate([cycle[:, :: max(cycle.shape[1] // 400, 1)] for cycle in cycles], axis=1)
     cloud = axes.plot(velocity, force, ".", color="0.58", markersize=2.0, label="measured, last cycles", zorder=0)
     peaks = peak_velocity_points(runs)
-    look: _style.Look = {"color": _style.BLACK, "markerfacecolor": "white", "markersize": 4.5, "zorder": 3}
     label = "measured at peak velocity"
     return [*cloud, *axes.plot(peaks.velocity.ravel(), peaks.force.ravel(), "o", label=label, **look)]
 

@@ -105,8 +105,9 @@ def fit_report(
     baseline = page["baseline"]
     best, *others = fit_verdict(report, comparison, baseline)
     report.verdict(best, f"{preflight.summary}." if preflight else "", more=others)
-    report.sheet(lambda: comparison.plot("sheet", baseline=baseline), comparison.verdict[0], "damper_sheet")
     records = (*comparison.best.result.runs, *comparison.held_out) if runs is None else tuple(runs)
+    if not all(run.of_points for run in records):  # a table has no cycles to show
+        report.sheet(lambda: comparison.plot("sheet", baseline=baseline), comparison.verdict[0], "damper_sheet")
     add_records(report, records, comparison.held_out, page["remarks"], preflight)
     add_fits(report, comparison, failures, baseline)
     if validation is not None:
@@ -156,6 +157,7 @@ def add_fits(
         others: the parameters of the other laws too; `add_other_fits` adds them later.
     """
     best, several = comparison.best, len(comparison.rungs) > 1
+    moved = not all(run.of_points for run in best.result.runs)  # a table has no loops
     report.heading("How good the laws are")
     if best.result.law.fitted_to is not None:
         report.table(fitted_range_table(best.result.law.fitted_to))
@@ -163,14 +165,16 @@ def add_fits(
     report.points(failure_sentences(comparison) if failures is None else failures)
     if several:
         report.picture(lambda: plots.ladder(comparison), "Errors of the laws", "ladder.png")
-        report.picture(lambda: comparison.plot("loops"), "One record and each law", "loops_by_law.png")
+        if moved:
+            report.picture(lambda: comparison.plot("loops"), "One record and each law", "loops_by_law.png")
     report.heading(f"The recommended law: {best.name}" if several else best.name)
     report.table(parameters_of(best))
     if best.judged_on:
         report.table(best.scores_table())
     add_findings(report, best.result)
     loops = functools.partial(plots.fit_loops, best.result, name=best.name)
-    report.picture(loops, f"{best.name} over the fitted records", "best_law_loops.png")
+    if moved:
+        report.picture(loops, f"{best.name} over the fitted records", "best_law_loops.png")
     if comparison.held_out:
         caption = f"{best.name} over the held-out records"
         report.picture(lambda: loops(comparison.held_out), caption, "best_law_held_out.png")

@@ -21,8 +21,8 @@ _STEP, _NODES, _LEAST = 0.0625, 257, 2e-5
 
 
 def coherency(
-    spatial_frequency: Float[ArrayLike, " lines"], track_width: ScalarLike | int, waviness: ScalarLike | int = 2.0
-) -> Float[Array, " lines"]:
+    spatial_frequency: Float[ArrayLike, "..."], track_width: ScalarLike | int, waviness: ScalarLike | int = 2.0
+) -> Float[Array, "..."]:
     """The coherency of two parallel tracks on an isotropic Gaussian surface whose spectrum is a power law n^-w.
 
     gamma(n) = 2 (x/2)^(w/2) K_(w/2)(x)/Gamma(w/2) with x = 2 pi B n and the modified Bessel function K. It is real,
@@ -31,7 +31,7 @@ def coherency(
     1e-12 for 2e-5 < x < 150; waves longer than 3e5 B count as that long.
 
     Arguments:
-        spatial_frequency: n [cycle/m], positive.
+        spatial_frequency: n [cycle/m], positive, of any shape.
         track_width: B, the distance between the tracks [m].
         waviness: w, positive.
 
@@ -47,9 +47,9 @@ def coherency(
     _checks.positive("spatial_frequency", spatial_frequency)
     _checks.positive("track_width", track_width)
     _checks.positive("waviness", waviness, "The standard uses 2.")
-    return _coherency(
-        jnp.asarray(spatial_frequency, float), jnp.asarray(track_width, float), jnp.asarray(waviness, float)
-    )
+    n = jnp.asarray(spatial_frequency, float)
+    found = _coherency(n.ravel(), jnp.asarray(track_width, float), jnp.asarray(waviness, float))
+    return found.reshape(n.shape)
 
 
 @jax.jit

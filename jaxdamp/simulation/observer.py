@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.ad_checkpoint import checkpoint_name
-from jaxtyping import Array, Float, Int, PyTree
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._types import Scalar, Signal
@@ -131,7 +131,7 @@ class Accumulators(NamedTuple):
     statistics: tuple[Gathered, ...]
     rest: tuple[Scalar, ...]  # channels that count from the static equilibrium, as they are there
     samples: tuple[Scalar, ...]  # of the metrics that need the whole record, at this instant
-    instant: Int[Array, ""] | None  # number of it, where a metric has a window
+    instant: Scalar | None  # number of it, where a metric has a window; printed loops count by no whole numbers
 
 
 @final
@@ -163,7 +163,7 @@ class MetricObserver(AbstractObserver):
         samples = self._samples(values, still, at_rest)
         gathered = tuple(m.statistic.begin(y) for m, y in zip(self.metrics, samples, strict=True))
         before = values if self.weighted else ()
-        instant = jnp.zeros((), int) if any(m.window for m in self.metrics) else None
+        instant = jnp.zeros_like(samples[0]) if any(m.window for m in self.metrics) else None
         return Accumulators(before, still, gathered, at_rest, self._saved(samples), instant)
 
     def add(self, gathered: Accumulators, now: StepState, road: RoadInput) -> Accumulators:
@@ -230,7 +230,7 @@ class MetricObserver(AbstractObserver):
 
 
 def _with_sample(
-    metric: Metric, window: tuple[int, int], before: Gathered, y: Scalar, instant: Int[Array, ""] | None
+    metric: Metric, window: tuple[int, int], before: Gathered, y: Scalar, instant: Scalar | None
 ) -> Gathered:
     """The terms of a metric with one sample more, if it lies in the window."""
     more = metric.statistic.add(before, y)

@@ -17,7 +17,7 @@ CURVATURE = 0.1  # second derivative of a row by a coordinate at first, relative
 SHARE = 1e-4  # of the sum of several objectives in each problem: excludes points that others beat in one objective
 PLANES = 4  # refused points whose tangents take part
 FAR_WORSE = -10.0  # loss in units of the promised gain, from which slopes at a point say nothing of those near by
-PENALTY, FURTHER, HIGHEST = 10.0, 10.0, 1e6  # of a violated limit, in units of the objectives: first, factor, highest
+PENALTY, FURTHER, HIGHEST = 10.0, 10.0, 1e9  # of a violated limit, in units of the objectives: first, factor, highest
 
 
 class Evaluation(NamedTuple):
@@ -274,16 +274,26 @@ class SequentialQuadratic:
         unit = self.scaling.unit
         slopes, curvature = state.evaluation.slopes / unit[:, None], state.curvature / unit[:, None, None]
         reach = np.abs(slopes[:count]) @ np.maximum(-lower, upper)
-        size = float(np.clip(reach.max(), 1e-12, 1.0))  # of the improvement that a step can bring
+        # The improvement that a step can bring; where limits are far dearer than objectives, each in their own size.
+        size = float(np.clip(reach[:count].max(), 1e-12, max(1.0, state.penalty / PENALTY)))
+        of_limits = min(size, 1.0)
+        sizes = np.where(np.arange(len(slopes)) < count, size, of_limits)
         level = self.scaling.of(state.evaluation.rows)
         level[:count] -= state.aim
         base = float(level[:count].max())
         level[:count] -= base
-        planes, plane_slopes = (part / size for part in self._planes(state, base))
-        scaled = level / size, slopes / size, curvature / size, planes, plane_slopes
-        step, promised = StepModels(*scaled, count, self._share, state.penalty).best_step(
-            lower, upper, region.matrix, region.least - region.matrix @ state.y
+        planes, plane_slopes = self._planes(state, base)
+        at_planes = np.tile(sizes, len(state.refused))
+        scaled = level / sizes, slopes / sizes[:, None], curvature / sizes[:, None, None]
+        models = StepModels(
+            *scaled,
+            planes / at_planes,
+            plane_slopes / at_planes[:, None],
+            count,
+            self._share,
+            state.penalty * of_limits / size,
         )
+        step, promised = models.best_step(lower, upper, region.matrix, region.least - region.matrix @ state.y)
         return step, size * promised
 
     def _planes(self, state: SearchState, base: float) -> tuple[np.ndarray, np.ndarray]:

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 
+LARGE = 10.0  # penalty above which the sum is divided by it
 ATTEMPTS = 3  # a search may end where limits are violated by more than the step gains, and goes on from there
 
 
@@ -71,11 +72,13 @@ class StepModels(NamedTuple):
         slack = np.zeros((len(self.level), 2))
         slack[:count, 0] = slack[count:, 1] = 1.0
         plane_slack = np.tile(slack, (len(self.planes) // len(slack), 1))
-        weights, order = np.array([1.0, self.penalty]), np.concatenate([matrix, np.zeros((len(matrix), 2))], axis=1)
+        unit = max(1.0, self.penalty / LARGE)  # SLSQP ends early where its numbers are large
+        weights, share = np.array([1.0, self.penalty]) / unit, self.share / unit
+        order = np.concatenate([matrix, np.zeros((len(matrix), 2))], axis=1)
 
         def merit(z: np.ndarray) -> tuple[float, np.ndarray]:
             value, slope = (a[:count].sum(axis=0) for a in self.change(z[:free]))
-            return weights @ z[free:] + self.share * value, np.concatenate([self.share * slope, weights])
+            return weights @ z[free:] + share * value, np.concatenate([share * slope, weights])
 
         def room(z: np.ndarray) -> np.ndarray:
             below = plane_slack @ z[free:] - self.planes - self.plane_slopes @ z[:free]

@@ -14,6 +14,7 @@ from jaxdamp.tune.task import Evaluator, Tolerance
 
 
 NEAR = 1e-3  # how far around an end gradients are sampled, relative to the unit of each coordinate
+AT_ZERO = 1e-9  # metric relative to its size at the start: as good as zero
 RESTARTS = 2  # with a new estimate of the curvature, if the search ends before an optimum
 
 
@@ -59,7 +60,7 @@ class Descent:
         If one ends before an optimum, its estimate of the curvature is wrong or a kink has stopped it: it is started
         again.
         """
-        solver = self._solver(abs(float(evaluations[0].rows[0])) or 1.0, limit_ends(limits))
+        solver = self._solver(float(self._evaluator.sizes(evaluations[0])[0]), limit_ends(limits))
         aim = np.zeros(1)
         states = [solver.init(aim, y, now) for y, now in zip(starts, evaluations, strict=True)]
         for state in states:
@@ -127,8 +128,13 @@ def missed(limits: Sequence[Limit], values: Mapping[str, float], tolerance: Tole
 
 
 def _slope_left(evaluator: Evaluator, state: SearchState, scaling: Scaling) -> float:
-    """Length of the scaled gradient after projection on bounds and active limits, relative to the metric."""
+    """Length of the scaled gradient after projection on bounds and active limits, relative to the metric.
+
+    Zero where a search ended by itself at a metric of zero, such as a distance from targets that are met.
+    """
     space, (_, rows, slopes) = evaluator.task.space, state.evaluation
+    if state.converged and abs(scaling.of(rows)[0]) < AT_ZERO:
+        return 0.0
     unbound = np.array([not side for side in space.side(state.y * space.unit)])
     unbound &= True if state.fixed is None else ~state.fixed
     gradient, walls = slopes[0, unbound], slopes[1:][_tight(evaluator, rows, scaling)][:, unbound].T

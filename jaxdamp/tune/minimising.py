@@ -124,7 +124,7 @@ def minimise(
     with Progress("Tuning") as shown:
         progress = progress or (lambda step, value: shown(f"step {step}, {name} {value:.5g}"))
         combining = every_combination(evaluator, progress)
-        task.refuse_constant(evaluations[0], [one.evaluation for one in combining.ends] if combining else ())
+        evaluator.refuse_constant(evaluations[0], [one.evaluation for one in combining.ends] if combining else ())
         descent = combining or Descent(evaluator, settings["max_steps"], progress)
         several = descent.search(starts, evaluations, limits)
         ended, tighter = _best(descent, several, limits), limits

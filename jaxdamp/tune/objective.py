@@ -92,7 +92,7 @@ def objective_of(
     beside = tuple(exact for exact in map(exact_counterpart, extra) if exact is not None)
     extra += beside
     available = _available(vehicle, extra, white=white)
-    names, functions, used = [], {}, [m.name for m in extra]
+    names, functions, used = [], {}, []
     for one in wanted:
         if isinstance(one, str | Metric):
             names.append(current_name(one, available) if isinstance(one, str) else one.name)
@@ -102,7 +102,8 @@ def objective_of(
         functions[names[-1]] = one
         used += _metrics_used_by(one, list(available), argument)
     _refuse_same_names(names, functions, available, argument)
-    _refuse_unusable(available, {argument: used, "limits": limited})
+    _refuse_unusable(available, {argument: used, "limits": limited, "metrics": [m.name for m in extra]})
+    used += [m.name for m in extra]
     # Further metrics for information: those without weightings, counts and means, which may be negative.
     chosen = [m for m in available.values() if m.name in (*used, *limited) or _for_information(m)]
     return Objective(tuple(names), tuple(functions.items()), tuple(chosen), beside)
@@ -133,8 +134,10 @@ def _refuse_unusable(available: Mapping[str, Metric], names_by_argument: Mapping
         for name in names:
             _checks.one_of(argument, name, available)
             if not available[name].statistic.differentiable:
-                limit = "limit `Metric('relative_tyre_load', 'minimum')` to (-1, None)."
+                limit = "limit `Metric('relative_tyre_load', 'minimum')` to (-0.95, None)."
                 remedy = f"Tune on the dynamic load coefficient; {limit}"
+                if argument == "metrics":
+                    remedy = "Leave it out; `Ride` and `simulate` give it for `result.start` and `result.vehicle`."
                 _checks.refuse(argument, "have a slope", f"{name!r}, a count", remedy)
 
 

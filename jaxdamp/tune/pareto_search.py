@@ -102,7 +102,7 @@ def pareto(
     evaluations, limits = evaluator.begin(starts)
     usable = [i for i, one in enumerate(evaluations) if i == 0 or all(np.all(np.isfinite(a)) for a in one)]
     before = task.numbers(evaluations[0].values)
-    size = np.abs([before[name] for name in names]) + np.finfo(float).tiny
+    size = evaluator.sizes(evaluations[0])
     with Progress("Tracing the front") as shown:
 
         def report(done: int, total: int) -> None:

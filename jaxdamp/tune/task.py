@@ -27,7 +27,7 @@ from jaxdamp.solve import Evaluation, Region
 from jaxdamp.tune.limits import Limit, LimitRange, limit_ends, limit_ranges, scaled
 from jaxdamp.tune.measuring import BatchProgram, Computed, Measurement
 from jaxdamp.tune.objective import Function, Targets, goal_limits, goal_objective, objective_of
-from jaxdamp.tune.ranges import search_range
+from jaxdamp.tune.ranges import search_range, start_points
 from jaxdamp.tune.result import V
 from jaxdamp.tune.scenario_ride import in_condition
 from jaxdamp.tune.scenarios import Condition, Road, Scenario, Scenarios
@@ -94,6 +94,8 @@ class Tolerance(NamedTuple):
     rounding: float
 
 
+ELSEWHERE = 2  # designs that are tried before an objective with no slope at the start is called constant
+NEAR_ZERO = 0.05  # of the change by all coordinates, of size one at the start: the least size of an objective
 DOUBLE, SINGLE = Tolerance(1e-4, 1e-6, 1e-13), Tolerance(1e-2, 1e-4, 1e-6)
 
 
@@ -109,6 +111,7 @@ class DesignTask(Generic[V]):
         allowed: the range of each limited metric, as it is written.
         units: of the metrics.
         run: duration, step and engine.
+        argument: that gave the objectives.
         tolerance: that the precision of the vehicle permits.
     """
 
@@ -121,7 +124,7 @@ class DesignTask(Generic[V]):
         argument: str,
         settings: Settings,
     ) -> None:
-        self.vehicle, self.road, self._argument = vehicle, road, argument
+        self.vehicle, self.road, self.argument = vehicle, road, argument
         self.run = part(settings, RUN)
         metrics, white = settings["metrics"], is_white(road)
         further = [m.name for m in metrics if isinstance(m, Metric)]
@@ -167,16 +170,6 @@ class DesignTask(Generic[V]):
         """The limits of metrics as they are shown: the largest value, or the smallest and the largest one."""
         spans = {name: allowed.at(before[name]) for name, allowed in self.allowed.items()}
         return {name: span[1] if np.isinf(span[0]) else span for name, span in spans.items()}
-
-    def refuse_constant(self, start: Evaluation, others: Sequence[Evaluation] = ()) -> None:
-        """Refuse objectives that do not depend on what is free: by their slopes, and by their values elsewhere."""
-        count, rounding = len(self.objective.names), 100.0 * self.tolerance.rounding
-        alike = [np.allclose(one.rows[:count], start.rows[:count], rounding, 0.0) for one in others]
-        if not start.slopes[:count].any() and all(alike):
-            before = self.numbers(start.values)
-            values = ", ".join(f"{name} = {before[name]:.4g}" for name in self.objective.names)
-            remedy = "Free a parameter that it depends on, or take a road on which it does."
-            _checks.refuse(self._argument, "depend on what is free", f"{values} whatever they are", remedy)
 
     def notes_on_runs(self, design: AbstractVehicle) -> tuple[list[str], list[str]]:
         """Notes on the step and on the fitted ranges for a design, in every scenario; and the dampers far outside."""
@@ -237,6 +230,31 @@ class Evaluator(Generic[V]):
         limits = self.task.limits(self.task.numbers(computed.values[0]))
         self._signed += [(end.name, end.sign) for end in limit_ends(limits)]
         return self.rows_of(computed), limits
+
+    def refuse_constant(self, start: Evaluation, others: Sequence[Evaluation] = ()) -> None:
+        """Refuse objectives that do not depend on what is free: by their slopes, and by their values elsewhere."""
+        task = self.task
+        count, rounding = len(task.objective.names), 100.0 * task.tolerance.rounding
+        if start.slopes[:count].any():
+            return
+        others = others or self.at(start_points(task.space, 1 + ELSEWHERE, 0)[1:] / task.space.unit)
+        if all(np.allclose(one.rows[:count], start.rows[:count], rounding, 0.0) for one in others):
+            before = task.numbers(start.values)
+            values = ", ".join(f"{name} = {before[name]:.4g}" for name in task.objective.names)
+            remedy = "Free a parameter that it depends on, or take a road on which it does."
+            _checks.refuse(task.argument, "depend on what is free", f"{values} whatever they are", remedy)
+
+    def sizes(self, start: Evaluation) -> Float[np.ndarray, " objectives"]:
+        """By what each objective is divided: its value at the start, or a part of what a step changes, if that is more.
+
+        Targets count as met at one, which is the least that they are divided by.
+        """
+        objective, count = self.task.objective, len(self.task.objective.names)
+        functions = dict(objective.functions)
+        least = [1.0 if isinstance(functions.get(name), Targets) else 0.0 for name in objective.names]
+        reach = NEAR_ZERO * np.abs(start.slopes[:count]).sum(axis=1)
+        sizes = np.maximum(np.maximum(np.abs(start.rows[:count]), reach), least)
+        return np.where(sizes > 0.0, sizes, 1.0)
 
     @property
     def region(self) -> Region:

@@ -17,7 +17,7 @@ from jaxdamp.vehicles import AbstractVehicle
 
 
 RADIUS = 0.5  # of the trust region of a search that goes on from another result
-FAR = 1e3  # aim of an objective that does not count, in units of its start
+FAR = 1e9  # aim of an objective that does not count, in units of its start
 NO_CONFLICT = 1e-4  # range of an objective between the ends, relative to its size, below which there is no front
 SCANNED = 128  # designs all over the bounds, simulated where peaks make many minima
 ELSEWHERE = 0.3  # least distance of another start, relative to the coordinate of the start

@@ -4,8 +4,8 @@ import enum
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from jaxdamp.metrics import Metric
-from jaxdamp.vehicles.frame import Frame
+from jaxdamp.metrics import STATISTICS, Metric, lift_off_below
+from jaxdamp.vehicles.frame import LOAD_AT_LIFT_OFF, Frame
 from jaxdamp.vehicles.parts import Body, Element, Link, Point, Wheel, prefixed
 
 
@@ -64,6 +64,8 @@ Measured = tuple[Channel, Point]  # a channel, and its linear combination of `si
 ANGULAR = (ChannelKind.ANGLE, ChannelKind.ANGULAR_ACCELERATION)
 OF_LINK = (ChannelKind.STROKE, ChannelKind.DAMPER_VELOCITY, ChannelKind.FORCE)
 OF_ANGULAR_LINK = (ChannelKind.TWIST, ChannelKind.TWIST_VELOCITY, ChannelKind.MOMENT)
+# Of a linear wheel, and of one that can lift off.
+LIFT_OFF_FRACTIONS = (STATISTICS["lift_off_fraction"], lift_off_below(LOAD_AT_LIFT_OFF))
 
 
 def signals(frame: Frame) -> list[str]:
@@ -259,6 +261,6 @@ def _of_tyres(frame: Frame) -> list[Metric]:
         load, relative = prefixed(wheel.name, "dynamic_tyre_load"), prefixed(wheel.name, "relative_tyre_load")
         coefficient = prefixed(wheel.name, "dynamic_load_coefficient")
         metrics += [Metric(load, "rms"), Metric(relative, "standard_deviation", name=coefficient)]
-        of_load = ("road_stress_factor", "lift_off_fraction")
-        metrics += [Metric(relative, statistic, name=prefixed(wheel.name, statistic)) for statistic in of_load]
+        of_load = (STATISTICS["road_stress_factor"], LIFT_OFF_FRACTIONS[wheel.lifts])
+        metrics += [Metric(relative, statistic, name=prefixed(wheel.name, statistic.name)) for statistic in of_load]
     return metrics

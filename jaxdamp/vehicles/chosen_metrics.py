@@ -1,11 +1,12 @@
 """Which metrics of a vehicle are meant: by names, by short names such as "comfort", or of any channel."""
 
+import dataclasses
 import itertools
 from collections.abc import Mapping, Sequence
 
 from jaxdamp import _checks
 from jaxdamp.metrics import Metric, current_names
-from jaxdamp.vehicles.channels import Channel, ChannelKind
+from jaxdamp.vehicles.channels import LIFT_OFF_FRACTIONS, Channel, ChannelKind
 
 
 # The short names of what a rider and a designer want: kind of the channel, statistic, whether it is weighted.
@@ -79,7 +80,9 @@ def chosen_metrics(
         wanted = list(itertools.chain.from_iterable(lists))
     names = [m for m in wanted if not isinstance(m, Metric)] if not isinstance(wanted, str) else wanted
     current = iter(current_names(argument, names, known))
-    chosen = [of_channel(m, channels, argument) if isinstance(m, Metric) else known[next(current)] for m in wanted]
+    chosen = [
+        of_channel(m, channels, metrics, argument) if isinstance(m, Metric) else known[next(current)] for m in wanted
+    ]
     return _of_different_names(chosen, argument)
 
 
@@ -93,12 +96,18 @@ def _of_different_names(metrics: Sequence[Metric], argument: str) -> list[Metric
     return list(by_name.values())
 
 
-def of_channel(metric: Metric, channels: Mapping[str, Channel], argument: str) -> Metric:
-    """The metric after a check of its channels, with the weighting of its channel instead of "default"."""
+def of_channel(metric: Metric, channels: Mapping[str, Channel], metrics: Sequence[Metric], argument: str) -> Metric:
+    """The metric after a check of its channels, with the weighting of its channel instead of "default".
+
+    Lift-off is counted as in the ride metrics, by whether the wheel can lift off.
+    """
     for name in (metric.channel, metric.by) if metric.by else (metric.channel,):
         _checks.one_of(f"channel of {argument}", name, channels)
     own = channels[metric.channel].kind.weighting
     if metric.weighting is not None and own is None:
         remedy = f"Leave its `weighting` out; {metric.channel} is {channels[metric.channel].kind.meaning}."
         _checks.refuse(argument, "weight an acceleration, as ISO 2631-1 does", repr(metric.channel), remedy)
+    counts = {m.channel: m.statistic for m in metrics if m.statistic in LIFT_OFF_FRACTIONS}
+    if metric.statistic in LIFT_OFF_FRACTIONS and metric.channel in counts:
+        return dataclasses.replace(metric, statistic=counts[metric.channel])
     return metric.weighted_by(own) if metric.weighting == "default" else metric

@@ -1,6 +1,7 @@
 """A vehicle as a list of parts: its matrices, elements and static loads, and tyres that lift off."""
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from functools import reduce
 from operator import or_
@@ -19,6 +20,12 @@ from jaxdamp.dampers import AbstractDamper, AbstractStateless, AbstractWrapper, 
 from jaxdamp.parameters import nonnegative, positive, setting
 from jaxdamp.vehicles.parts import SPRUNG, Body, Element, Link, Place, Point, Wheel, matrix, prefixed
 from jaxdamp.vehicles.port_form import PortForm, Ports, sum_springs
+
+
+_WIDTH = 0.01
+# What a tyre that can lift off still carries, as a share of its static load, where it would lose contact without the
+# rounding of its load.
+LOAD_AT_LIFT_OFF = _WIDTH * math.log(2.0)
 
 
 @final
@@ -42,7 +49,7 @@ class LiftOff(AbstractStateless):
     tyre_stiffness: Number = setting("N/m", "vertical tyre stiffness", positive)
     tyre_damping: Number = setting("N s/m", "vertical tyre damping", nonnegative)
     static_load: Number = setting("N", "load of the wheel at rest", positive)
-    width: Number = setting("", "share of the static load over which the contact ends", positive, default=0.01)
+    width: Number = setting("", "share of the static load over which the contact ends", positive, default=_WIDTH)
 
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
         """Force [N] in addition to the linear tyre, at deflection x [m], positive in extension, and rate v [m/s]."""

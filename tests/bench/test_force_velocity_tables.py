@@ -5,7 +5,7 @@ import numpy as np
 import openpyxl
 import pytest
 
-from jaxdamp import bench, identify
+from jaxdamp import bench, dampers, identify
 from jaxdamp._display import Display, shown_in
 from jaxdamp.bench.settings import settings_in_name
 from jaxdamp.dampers import Bilinear, SplineTable, with_command
@@ -160,6 +160,82 @@ def test_a_law_is_fitted_to_a_table(tmp_path):
     table = bench.read_table(written(tmp_path, "v [m/s],F [N]\n0.1,100\n0.2,200\n0.5,500\n"), side="symmetric")
     result = identify.fit(identify.default_ladder(table.runs(), ["linear"])["linear"], table.runs())
     assert float(get(result.law, "rate")) == pytest.approx(1000.0, rel=1e-3)
+
+
+def test_a_fit_to_a_table_knows_its_points_and_no_more(tmp_path):
+    """Errors are those of least squares over the points, which are left out whole; free curves predict worse."""
+    velocity = np.array([-1.048, -0.524, -0.262, -0.131, -0.052, 0.052, 0.131, 0.262, 0.524, 1.048])
+    force = 2000.0 * velocity + np.random.default_rng(1).normal(0.0, 60.0, 10)
+    rows = "\n".join(f"{v},{f}" for v, f in zip(velocity, force, strict=True))
+    runs = bench.read_table(written(tmp_path, f"v [m/s],F [N]\n{rows}\n"), sign="rebound-positive").runs()
+    result = identify.fit(dampers.Linear, runs, rig="offset")
+    slope = np.polynomial.polynomial.polyfit(velocity, force, 1)
+    left = force - np.polynomial.polynomial.polyval(velocity, slope)
+    error = np.sqrt(np.sum(left**2) / 8 / np.sum((velocity - velocity.mean()) ** 2))
+    assert result["rate"].value == pytest.approx(slope[1], rel=1e-6)
+    assert result["rate"].standard_error == pytest.approx(error, rel=1e-6)
+    ladder = identify.compare(identify.default_ladder(runs, ["linear", "polynomial", "piecewise_linear"]), runs)
+    assert ladder.best.name == "linear" and "each quarter of the points" in ladder.verdict[0]
+    held_out = {rung.name: rung.error for rung in ladder.rungs}
+    assert held_out["polynomial"] > held_out["linear"] > np.sqrt(np.mean(left**2))
+    assert not bench.preflight(runs).findings  # nothing is wrong with a motion that there was not
+
+
+SIGNED = "v [m/s],F [N]\n-0.2,-{0}\n-0.1,-20\n0.1,50\n0.2,70\n"
+HALF = "v [m/s],F [N]\n0.1,20\n0.2,{0}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "files", "settings"),
+    [
+        (SIGNED, {"soft.csv": 30, "hard.csv": 90}, {"hard": -90, "soft": -30}),
+        (SIGNED, {"fsd_a_0.5A.csv": 30, "fsd_a_1A.csv": 90}, {"0.5": -30, "1": -90}),
+        (SIGNED, {"rear_L.csv": 30, "rear_R.csv": 90}, {"L": -30, "R": -90}),
+        (SIGNED.replace("F", "4 clicks"), {"a.csv": 30, "b.csv": 90}, {"a 4": -30, "b 4": -90}),
+        (HALF, {"rebound.csv": 70, "compression.csv": 30}, {"": -30}),
+        (HALF, {"R_1.csv": 70, "R_2.csv": 75, "C_1.csv": 30, "C_2.csv": 90}, {"1": -30, "2": -90}),
+        (HALF, {"rebound_1.csv": 70, "rebound_2.csv": 75, "compression.csv": 30}, {"1": -30, "2": -30}),
+    ],
+)
+def test_files_of_one_direction_are_joined_and_others_are_settings(tmp_path, text, files, settings):
+    for name, force in files.items():
+        written(tmp_path, text.format(force), name)
+    table = bench.read_table(tmp_path, sign="rebound-positive")
+    assert {curve.setting: curve.force[0] for curve in table.curves} == settings
+    assert all(name in str(table.notes) and name.removesuffix(".csv") in table.name for name in files)
+
+
+def test_files_of_one_name_that_give_the_same_are_refused(tmp_path):
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        written(tmp_path / folder, SIGNED.format(30))
+    message = (
+        r"a/sheet.csv, column .* and .*b/sheet.csv.* both give the force in .*names of files and sheets, or keep one"
+    )
+    with pytest.raises(ValueError, match=message):
+        bench.read_table([tmp_path / "a", tmp_path / "b"], sign="rebound-positive")
+
+
+@pytest.mark.parametrize("name", ["rear_R.csv", "left_c.csv"])
+def test_a_letter_in_the_name_of_a_file_with_signs_is_a_side_of_the_car(tmp_path, name):
+    (curve,) = bench.read_table(written(tmp_path, SIGNED.format(30), name), sign="rebound-positive").curves
+    np.testing.assert_allclose(curve.force, [-30.0, -20.0, 50.0, 70.0])
+    way = "rebound" if name == "rear_R.csv" else "compression"
+    with pytest.raises(ValueError, match=f"the name of its file or sheet says is {way}: subtract .* or rename it"):
+        bench.read_table(written(tmp_path, HALF.format(-30), name))
+
+
+@pytest.mark.parametrize("head", ["v_in_s,F_lbf", "v_in_s,R_lbf,C_lbf", "v_in_s,rebound_lbf,compression_lbf"])
+def test_a_unit_behind_an_underscore_is_no_setting(tmp_path, head):
+    rows = "1,10,5\n5,40,15\n" if "," in head[7:] else "-1,-5\n1,10\n"
+    table = bench.read_table(written(tmp_path, f"{head}\n{rows}"), sign="rebound-positive")
+    assert table.settings == ("",)
+
+
+def test_forces_at_rest_are_those_of_the_sheet_and_no_note_denies_them(tmp_path):
+    table = bench.read_table(written(tmp_path, "v [m/s],rebound [N],compression [N]\n0,40,30\n0.1,400,200\n"))
+    assert table.curves[0].force.tolist() == [-200.0, 5.0, 400.0]
+    assert "points at the same velocity are averaged" in table.notes and "no force at rest" not in str(table.notes)
 
 
 TIME = np.arange(400) / 200

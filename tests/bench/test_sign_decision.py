@@ -72,6 +72,36 @@ def test_a_stroke_that_does_not_come_back_cannot_decide_but_one_that_does_can(sh
     assert decide(time, stroke, force, None, "opposite", "run").force == -1.0
 
 
+@pytest.mark.parametrize(
+    ("headers", "motion"),
+    [
+        (["compression travel [mm]"], -1.0),
+        (["bump travel [mm]", "v [m/s]"], -1.0),
+        (["x [mm]", "jounce velocity [m/s]"], -1.0),
+        (["stroke (compression negative) [mm]"], 1.0),
+        (["rebound travel [mm]"], 1.0),
+        (["extension_mm"], 1.0),
+    ],
+)
+@pytest.mark.parametrize("turn", [1.0, -1.0])
+def test_the_header_says_which_direction_is_rebound(headers, motion, turn):
+    decision = decide(TIME, STROKE, turn * FORCE, None, None, "run", headers)
+    assert (decision.motion, decision.force) == (motion, turn * motion)
+    way = "compression" if motion < 0 else "rebound"
+    assert f"positive stroke is {way}, as the header " in decision.notes[1]
+    own, other = f"{way}-positive", "rebound-positive" if motion < 0 else "compression-positive"
+    assert decide(TIME, STROKE, FORCE, own, None, "run", headers).motion == motion
+    with pytest.raises(ValueError, match=f'"{other}" contradicts the header .*, which says {own}. Leave it out'):
+        decide(TIME, STROKE, FORCE, other, None, "run", headers)
+    with pytest.raises(ValueError, match=f'cannot be established .* Pass sign="{own}".$'):
+        decide(TIME, STROKE, 1e4 * STROKE, None, None, "run", headers)
+
+
+def test_headers_of_opposite_directions_are_refused():
+    with pytest.raises(ValueError, match=r"'bump \[mm\]' and 'rebound velocity' are .* opposite .*\"velocity\": None"):
+        decide(TIME, STROKE, FORCE, None, None, "run", ["bump [mm]", "rebound velocity"])
+
+
 def test_unknown_words():
     with pytest.raises(ValueError, match=r"`sign`.*Did you mean 'rebound-positive'"):
         decide(TIME, STROKE, FORCE, "rebound", None, "run")

@@ -36,6 +36,41 @@ def clock(t, form):
 
 
 @pytest.mark.parametrize(
+    ("header", "columns"),
+    [("compression travel [mm]", {}), ("bump travel [mm]", {}), ("compression [mm]", {"stroke": 1})],
+)
+def test_a_header_that_says_compression_is_read_so(tmp_path, header, columns):
+    speed = 0.025 * 4 * np.pi * np.cos(4 * np.pi * T)
+    force = np.where(speed > 0, 3000 * speed, 1500 * speed) + 50
+    rows = [f"{t},{x},{-f}" for t, x, f in zip(T, -25 * np.sin(4 * np.pi * T), force, strict=True)]
+    (tmp_path / "run.csv").write_text("\n".join([f"time [s],{header},force [N]", *rows]))
+    (run,) = read(tmp_path / "run.csv", columns=columns)
+    largest = int(np.argmax(run.force))
+    assert run.force[largest] == pytest.approx(992.48, rel=1e-3)
+    assert run.velocity[largest] == pytest.approx(0.31416, rel=1e-3)
+
+
+def test_minus_signs_of_spreadsheets(tmp_path):
+    rows = [f"{t},{x:.6f},{f:.4e}".replace("-", "\u2212") for t, x, f in zip(T, X, F, strict=True)]
+    (tmp_path / "run.csv").write_text("\n".join(["t_s,x_mm,F_N", *rows]), encoding="utf-8")
+    np.testing.assert_allclose(read(tmp_path / "run.csv")[0].force, F, atol=1e-2)
+
+
+@pytest.mark.parametrize(("mark", "cell"), [(",", '"1,200"'), (",", '"-0,5"'), (";", "1 200"), (";", "-1'200")])
+def test_thousands_and_decimal_commas_that_are_not_read_are_named(tmp_path, mark, cell):
+    def refused(header, rows, words):
+        (tmp_path / "run.csv").write_text("\n".join(mark.join(row) for row in [header, *rows]))
+        with pytest.raises(ValueError, match=words):
+            read(tmp_path / "run.csv")
+
+    bare, advice = cell.strip('"'), "export the file with decimal points and without a sign for thousands"
+    refused(["t_s", "F_N"], [["1", cell]] * 30, f"{bare}.*, which is not read as a number: {advice}")
+    rows = [[f"{t}", f"{x:.4f}", f"{f:.4f}"] for t, x, f in zip(T, X, F, strict=True)]
+    refused(["t_s", "x_mm", "F_N"], [[*row[:2], cell] for row in rows], f"holds text .*{bare}.*: {advice}")
+    refused(["t_s", "F_N", "x_mm"], [*rows, ["2.1", cell, cell]], f"{bare}.* is not a number")
+
+
+@pytest.mark.parametrize(
     "form", ["iso", "iso space", "iso zone", "iso midnight", "clock", "clock midnight", "am", "german"]
 )
 def test_time_stamps(tmp_path, form):

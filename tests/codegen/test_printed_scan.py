@@ -14,6 +14,7 @@ import pytest
 from jaxdamp import Ride, roads, sweep, vehicles
 from jaxdamp.codegen import _lanes, _native, _scan, compiler, printed_scan
 from jaxdamp.dampers import Besinger, BoucWen, Lag, PiecewiseLinear, PowerLaw, SeriesSpring
+from jaxdamp.metrics import Metric
 from jaxdamp.simulation import Exponential, simulate
 from jaxdamp.sweeps import running
 
@@ -299,8 +300,9 @@ def test_a_sweep_of_all_ride_metrics():
 
 def test_a_sweep_prints_its_loop_and_a_long_one_compares(monkeypatch):
     """With the numbers of XLA, which does all where derivatives, functions or a missing compiler stand in the way."""
-    metric = "rms_sprung_acceleration"
-    ride = Ride(CAR, ROAD, metrics=[metric], duration=0.4)
+    windowed = Metric("sprung_acceleration", "peak", window=(0.1, 0.3))
+    metric, names = "rms_sprung_acceleration", ["rms_sprung_acceleration", windowed]
+    ride = Ride(CAR, ROAD, metrics=names, duration=0.4)
     tried, original = [], running._Pace
 
     class Slow(original):
@@ -314,11 +316,12 @@ def test_a_sweep_prints_its_loop_and_a_long_one_compares(monkeypatch):
         data = sweep(function, {RATE: np.linspace(2e3, 5e3, 20)}, chunk=1, **options)
         return data, len(tried), data.attrs["loop"]
 
-    by_xla = Ride(CAR, ROAD, metrics=[metric], duration=0.4, engine=Exponential(printed=False))
+    by_xla = Ride(CAR, ROAD, metrics=names, duration=0.4, engine=Exponential(printed=False))
     plain = swept(by_xla)[0]
     printed, *what = swept()
     assert what == [1, "printed as C"]
-    np.testing.assert_allclose(printed[metric], plain[metric], rtol=1e-12)
+    for name in (metric, windowed.name):
+        np.testing.assert_allclose(printed[name], plain[name], rtol=1e-12)
     monkeypatch.setattr(running, "LONG", 0.0)
     monkeypatch.setattr(running, "TURNS", 1)
     assert swept()[1] == 2

@@ -1,9 +1,17 @@
+import pickle
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxdamp.metrics import STATISTICS, dynamic_load_coefficient, lift_off_fraction, road_stress_factor
+from jaxdamp.metrics import (
+    STATISTICS,
+    dynamic_load_coefficient,
+    lift_off_below,
+    lift_off_fraction,
+    road_stress_factor,
+)
 
 
 VARIATION = 900.0 * np.sin(2 * np.pi * np.arange(128) / 128)
@@ -50,6 +58,15 @@ def test_a_wheel_in_the_air_counts_as_lifted_also_with_the_rounding_of_its_load(
     rounded = -1.0 + np.finfo(precision).eps * np.array([0.0, 1.0, -1.0, 2.0, -2.0])
     load = jnp.asarray(np.append(rounded, [-0.999, -0.5, 0.0]), precision)
     assert float(STATISTICS["lift_off_fraction"].of(load, 1e-3)) == pytest.approx(5 / 8)
+
+
+@pytest.mark.parametrize("precision", [np.float32, np.float64])
+def test_a_tyre_with_a_rounded_load_is_lifted_off_below_a_share_of_its_static_load(precision):
+    load = jnp.asarray([-1.0, -0.9951, -0.9949, -0.5, 0.0], precision)
+    rounded = lift_off_below(0.005)
+    assert float(rounded.of(load, 1e-3)) == pytest.approx(2 / 5)
+    copy = pickle.loads(pickle.dumps(rounded))
+    assert copy == rounded and hash(copy) == hash(rounded) and copy != STATISTICS["lift_off_fraction"]
 
 
 def test_lift_off_has_no_gradient():

@@ -32,6 +32,14 @@ def test_equals_the_bessel_function_of_scipy(waviness):
     np.testing.assert_allclose(coherency(n, 1.5, waviness), expected, rtol=1e-12)
 
 
+def test_frequencies_of_any_shape():
+    x = 2 * np.pi * 0.1 * 1.5
+    alone = coherency(0.1, 1.5)
+    assert alone.shape == () and float(alone) == pytest.approx(x * special.kv(1, x), rel=1e-12)
+    table = np.array([[0.01, 0.1, 1.0], [0.02, 0.2, 2.0]])
+    np.testing.assert_array_equal(coherency(table, 1.5), coherency(table.ravel(), 1.5).reshape(2, 3))
+
+
 def test_long_waves_are_alike_short_ones_are_not():
     gamma = coherency(jnp.array([1e-9, 1e-3, 0.1, 10.0]), 1.5)
     assert np.all(np.diff(gamma) < 0) and np.all(gamma <= 1.0)

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from jaxdamp import Ride, dampers, metrics, roads, simulate, vehicles
+from jaxdamp import Ride, dampers, metrics, roads, simulate, sweep, vehicles
 from jaxdamp.metrics.weighted import discrete_weighting
 from jaxdamp.simulation import fixed_step
 from jaxdamp.simulation.observer import Filter
 from jaxdamp.vehicles import Body, Frame, Link, LumpedVehicle, Wheel
-from jaxdamp.vehicles.presets import half_car_002, quarter_car_000
+from jaxdamp.vehicles.presets import half_car_002, quarter_car_000, quarter_car_mathworks
 
 
 pytestmark = pytest.mark.users_flags
@@ -50,6 +50,37 @@ def test_the_lifting_car_lifts_and_steps_are_divided():
     assert 0 < float(ride()["lift_off_fraction"]) < 0.2
     longer = Ride(lifting_car(), ROUGH, duration=2.0, dt=2e-3, metrics=["lift_off_fraction"])
     assert (ride.substeps, longer.substeps) == (1, 2)
+
+
+def hop(height):
+    """A bump that throws the wheel off the road for some ms."""
+    return roads.cosine_bump(height, start=0.3, length=1.0, speed=12.0)
+
+
+@pytest.mark.parametrize("lifts", [True, False])
+def test_a_wheel_is_lifted_off_while_it_is_above_the_road(lifts):
+    """A linear tyre pulls there, by which it comes down earlier."""
+    car, counts = quarter_car_mathworks(tyre_lifts=lifts), []
+    for height in (0.018, 0.02, 0.025, 0.03):
+        run = simulate(car, hop(height), duration=0.8)
+        clearance = np.asarray(run["z_unsprung"]) - np.asarray(run["z_road"]) - 360.0 * 9.80665 / 190e3
+        counts.append(round(801 * float(run.metrics()["lift_off_fraction"])))
+        assert counts[-1] == pytest.approx(np.sum(clearance > 0.0), abs=1)
+    assert counts == pytest.approx([8, 16, 27, 35] if lifts else [8, 15, 23, 27], abs=1)
+
+
+def test_lift_off_is_the_same_in_a_run_a_ride_a_sweep_and_single_precision():
+    """The ride metric, and one of a user: the sweep prints its loop as C, where a compiler is at hand."""
+    wanted = ["lift_off_fraction", metrics.Metric("relative_tyre_load", "lift_off_fraction", name="own")]
+
+    def ride():
+        return Ride(quarter_car_mathworks(tyre_lifts=True), hop(0.02), duration=0.8, metrics=wanted)
+
+    swept = sweep(ride(), {"sprung_mass": [300.0, 330.0]}).isel(sprung_mass=0)
+    found = [simulate(ride().vehicle, hop(0.02), duration=0.8).metrics(wanted), ride()(), swept]
+    with jax.enable_x64(False):
+        found.append(ride()())
+    assert [round(801 * float(values[m])) for values in found for m in ("lift_off_fraction", "own")] == [16] * 8
 
 
 def test_every_statistic_is_the_same_gathered_and_at_once(rng):

@@ -59,6 +59,14 @@ def test_a_curved_limit_holds_from_inside_and_outside_in_any_unit(start, unit) -
     assert state.converged
 
 
+@pytest.mark.parametrize("steep", [1.0, 1e3, 1e5, 1e8])
+def test_a_limit_holds_however_steep_the_objective(steep: float) -> None:
+    """steep x² where x must be 1 or more."""
+    steeply = lambda x, y: [(steep * x**2, [2.0 * steep * x, 0.0]), (1.0 - x, [-1.0, 0.0])]  # noqa: E731
+    (state,) = solved(steeply, np.array([[3.0, 1.0]]), LIMITED)
+    assert state.converged and state.y[0] == pytest.approx(1.0, abs=1e-6)
+
+
 def test_a_limit_that_costs_more_than_the_penalty_holds_too() -> None:
     """The multiplier of the limit is 200: the penalty of 10 alone would leave it violated."""
     steep = Scaling(np.zeros(2), np.array([0.01, 1.0]), 1)

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxdamp import dampers, metrics, roads, tune, vehicles
+from jaxdamp import Ride, dampers, metrics, roads, tune, vehicles
 from jaxdamp.metrics import Metric
 from jaxdamp.parameters import get
 
@@ -66,6 +66,26 @@ def test_only_what_a_function_asks_for_is_computed():
     assert "vibration_dose_value_sprung_acceleration" not in result.after
 
 
+COMFORT, SPACE = "rms_sprung_acceleration", "working_space_rms"
+
+
+@pytest.mark.parametrize("beside", [0.0, 1e-6, 1e-3])
+def test_targets_met_at_the_start_give_way_to_a_limit(beside):
+    """Comfort as it is, but less working space: the damper that the limit needs."""
+    start = Ride(CAR, WHITE, metrics=[COMFORT, SPACE])({})
+    wanted = tune.Targets({COMFORT: (float(start[COMFORT]) * (1.0 + beside), 0.01)})
+    result = tune.minimise(wanted, CAR, WHITE, limits={SPACE: 0.8 * float(start[SPACE])})
+    assert result.status is tune.Status.CONVERGED and result.active_limits == (SPACE,)
+    # By the closed form the square of the working space falls as one over the rate of a linear damper.
+    assert float(get(result.vehicle, "damper.rate")) == pytest.approx(2500.0 / 0.8**2, rel=1e-3)
+
+
+def test_targets_that_are_met_exactly_are_an_optimum():
+    wanted = tune.Targets({COMFORT: (0.93, 0.01)})
+    result = tune.minimise(wanted, CAR, WHITE)
+    assert result.status is tune.Status.CONVERGED and result.after[COMFORT] == pytest.approx(0.93, rel=1e-6)
+
+
 def test_what_is_no_objective_is_refused():
     with pytest.raises(KeyError, match="did you mean 'rms_sprung_acceleration'"):
         tune.minimise(lambda m: m["rms_sprung_accel"], CAR, WHITE)
@@ -73,5 +93,7 @@ def test_what_is_no_objective_is_refused():
         tune.minimise(lambda m: jnp.stack([m["rms_sprung_acceleration"]] * 2), CAR, WHITE)
     with pytest.raises(ValueError, match="`metric` must have a slope, but is 'lift_off_fraction'"):
         tune.minimise(lambda m: m["lift_off_fraction"], CAR, BUMP, duration=0.4)
+    with pytest.raises(ValueError, match=r"`metrics` must have a slope, but is 'lift_off_fraction', a count. Leave it"):
+        tune.minimise(COMFORT, CAR, BUMP, metrics=["lift_off_fraction"], duration=0.4)
     with pytest.raises(ValueError, match=r"`metric` must be one of .*'rms_sprung_acceleration'"):
         tune.minimise(Metric("stroke", metrics.percentile(95)), CAR, WHITE)

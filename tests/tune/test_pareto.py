@@ -179,6 +179,13 @@ def test_a_limit_that_no_design_meets_is_named():
     assert front.designs[0, 0] == pytest.approx(7500.0, rel=1e-4)
 
 
+def test_targets_met_at_the_start_do_not_cut_the_front_off():
+    """The other end is the best design of the other objective, however small the first one is at the start."""
+    comfort = float(exact(2500.0)[0])
+    front = tune.pareto([tune.Targets({COMFORT: (1.0003 * comfort, 0.01)}), TYRE], CAR, ROAD, points=3)
+    assert front.converged and front.designs[-1, 0] == pytest.approx(BEST_TYRE, rel=2e-3)
+
+
 @pytest.mark.exhaustive
 def test_metrics_without_conflict_have_one_best_design():
     front = tune.pareto([TYRE, "dynamic_load_coefficient"], CAR, ROAD, points=3)

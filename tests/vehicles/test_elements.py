@@ -10,7 +10,7 @@ from jaxdamp import Ride, dampers, roads, simulate
 from jaxdamp.metrics import Metric
 from jaxdamp.parameters import replace
 from jaxdamp.vehicles import CubicSpring, QuarterCar, linearise, oscillations, static_equilibrium
-from jaxdamp.vehicles.frame import LiftOff
+from jaxdamp.vehicles.frame import LOAD_AT_LIFT_OFF, LiftOff
 from jaxdamp.vehicles.port_form import Ports
 
 from .fleet import full_quarter_car
@@ -70,6 +70,7 @@ def test_lift_off_is_linear_then_constant():
         total = 180e3 * d + 300.0 * v + float(law.force_stroke_velocity(d, v))
         assert total == pytest.approx(3000.0, rel=1e-9) and float(law.contact_force(d, v)) < 1e-6
     assert float(law.force_stroke_velocity(0.0, 0.0)) == 0.0
+    assert float(law.contact_force(3000.0 / 180e3, 0.0)) == pytest.approx(3000.0 * LOAD_AT_LIFT_OFF, rel=1e-12)
     slope = jax.vmap(jax.grad(lambda d: law.force_stroke_velocity(d, 0.0)))(jnp.linspace(-0.05, 0.05, 401))
     assert np.all(np.isfinite(slope)) and np.all(np.diff(slope) <= 1e-6)
 

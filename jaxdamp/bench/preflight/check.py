@@ -155,7 +155,7 @@ def preflight(runs: BenchRun | Iterable[BenchRun]) -> Preflight:
     >>> found.ok, [finding.name for finding in found.findings]
     (True, ['rest before', 'run-up'])
     """
-    chosen = as_records(runs, "preflight(runs)")
+    chosen = [run for run in as_records(runs, "preflight(runs)") if not run.of_points]  # these are no motion
     findings = [finding for run in chosen for finding in _of_record(run)]
     for family in ((turned_by_the_reader, turned_motion), (mixed_settings,)):
         wrong = {name for finding in findings if finding.severity == "error" for name in finding.records}
@@ -221,7 +221,9 @@ def usable(
 
 
 def _first_error(run: BenchRun, robust: bool) -> Finding | None:
-    """The first finding of a record that is an error."""
+    """The first finding of a record that is an error; the points of a table are no motion to be looked at."""
+    if run.of_points:
+        return None
     examined = Examined(run)
     findings = (finding for check in ERRORS for finding in check(examined) if finding.severity == "error")
     return next((finding for finding in findings if not (robust and finding.name.endswith("spikes"))), None)
