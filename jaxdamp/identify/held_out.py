@@ -32,6 +32,7 @@ LEAST_CHANGE = 0.5  # of what changes the force by its RMS: numbers are never he
 LEAST_UNREACHED = 0.05  # of the samples of a record, beyond the velocities of all others, which then count
 SLICES = 5  # in which a part of a record of few cycles is spread over it
 REFIT_STEPS = 12  # of each refit at most, from the minimum of all records
+_WITHOUT = " predicted by fits without it"
 
 Part = tuple[Bool[np.ndarray, " _"], ...]  # the samples of each record that are left out
 
@@ -79,7 +80,7 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
         models, told = _predicting(_refitted(start, factor), fitted, part, result)
         samples += compared(models, problem.runs, problem.initial_state, parts, told)
     beyond = _beyond(result, fitted, unreached) if samples else []
-    words = f"each of {len(runs)} records predicted by fits without it" if whole else _quarters(runs, alike=len(groups) == 1)
+    words = _quarters(runs, alike=len(groups) == 1) if not whole else f"each of {len(runs)} records{_WITHOUT}"
     words += ", velocities that no other reaches by the fit of all" * bool(beyond)
     return _together([*samples, *beyond], words)
 
@@ -87,9 +88,8 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
 def _quarters(runs: Sequence[BenchRun], *, alike: bool) -> str:
     """What was predicted from what, in words, where parts of records of one motion or of several are left out."""
     if all(run.of_points for run in runs):
-        return "each quarter of the points predicted by fits without it"
-    words = f"each quarter of the record{'s' * (len(runs) > 1)} predicted by fits without it"
-    return words + ", all of one motion" * alike
+        return f"each quarter of the points{_WITHOUT}"
+    return f"each quarter of the record{'s' * (len(runs) > 1)}{_WITHOUT}" + ", all of one motion" * alike
 
 
 def _as_wholes(result: FitResult, problem: Problem, groups: Sequence[Sequence[int]]) -> bool:

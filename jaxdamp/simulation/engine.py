@@ -139,6 +139,11 @@ class AbstractEngine(AbstractLawEngine):
         """The engine of a sweep without derivatives, whose loop may be printed; None if it stays this one."""
         return None
 
+    @property
+    def is_printed(self) -> bool:
+        """Whether its loop is printed as C."""
+        return False
+
     def layout(self, states: int, *, side_by_side: bool) -> MemoryLayout:
         """How the vectors of a vehicle lie in memory.
 

@@ -245,6 +245,11 @@ class Exponential(AbstractFixedStep):
         return dataclasses.replace(self, printed=True) if self.printed is None else None
 
     @property
+    def is_printed(self) -> bool:
+        """If it was told so."""
+        return self.printed is True
+
+    @property
     def derivatives(self) -> tuple[Mode, ...]:
         """Both, but none through a printed loop."""
         return () if self.printed else super().derivatives

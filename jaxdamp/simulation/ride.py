@@ -200,6 +200,11 @@ class Ride(eqx.Module):
             return None
         return eqx.tree_at(lambda ride: ride.engine, self, engine).side_by_side()
 
+    @property
+    def is_printed(self) -> bool:
+        """Whether its loop is printed as C."""
+        return self.engine.is_printed
+
     def range_use(self, point: Point | None = None) -> dict[str, list[RangeUse]]:
         """What each damper does at a point beside the range that its law was fitted to; only of laws that have one.
 

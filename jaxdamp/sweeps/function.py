@@ -71,6 +71,11 @@ class HasPrinted(Protocol):
         """That form, for sweeps without derivatives; None if XLA is to compile it in any case."""
         ...
 
+    @property
+    def is_printed(self) -> bool:
+        """Whether it has that form already."""
+        ...
+
 
 @runtime_checkable
 class HasDomain(Protocol):

@@ -239,7 +239,8 @@ class Computation:
 
     def loop(self, runner: Runner) -> str:
         """By what the loop of the function was compiled at the end."""
-        return COMPILED if runner.program.traced is self.traced else PRINTED
+        told = isinstance(self.function, HasPrinted) and self.function.is_printed
+        return PRINTED if told or runner.program.traced is not self.traced else COMPILED
 
 
 def _lanes(function: object) -> int | None:

@@ -334,6 +334,7 @@ def test_a_sweep_prints_its_loop_and_a_long_one_compares(monkeypatch):
     xla = [1, "compiled by XLA"]
     monkeypatch.setattr(running, "LONG", 60.0)
     assert [*swept(gradients=True)[1:]] == [*swept(by_xla)[1:]] == xla
+    assert swept(Ride(CAR, ROAD, metrics=names, duration=0.4, engine=Exponential(printed=True)))[2] == "printed as C"
     monkeypatch.setattr("jaxdamp.simulation.ride.compiler", lambda: None)
     assert [*swept()[1:]] == xla
 
