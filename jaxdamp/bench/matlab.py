@@ -14,17 +14,32 @@ _MOST_COLUMNS = 64  # of a matrix that is taken for channels side by side
 _UNITS, _LABELS = ("unit", "units"), ("name", "label", "title")  # keys in lower case, as all that follow
 _DATA, _FACTORS, _OFFSETS = ("data", "values", "value", "samples"), ("scale", "factor", "gain", "slope"), ("offset",)
 _NAMES = ("names", "labels", "channels", "channelnames", "channel_names", "columns", "headers", "header")
+_CLASSES = ("timeseries", "timetable", "table", "Simulink.SimulationData.Dataset", "Simulink.SimulationOutput")
 _SIGNALS = "signals"  # of the structures that Simulink writes, in which a channel may be a matrix
 Structure: TypeAlias = dict[str, Untyped]  # arrays, numbers, texts, lists and structures
 
 
 def read_mat(file: Path) -> list[RawTable]:
     """Read a MATLAB file, v5 to v7.3: vectors side by side, in the file or in a structure, are a record."""
+    with file.open("rb") as opened:
+        in_hdf5 = b"MATLAB 7.3" in opened.read(128)
+    if in_hdf5:
+        _refuse_objects(file)
     content = library("pymatreader", file).read_mat(file)
     fields = {k: v for k, v in content.items() if not k.startswith("__")}
-    with file.open("rb") as opened:
-        ordered = _in_order(fields) if b"MATLAB 7.3" in opened.read(128) else fields
-    return alone(list(_structures(file, "", ordered, {})))
+    return alone(list(_structures(file, "", _in_order(fields) if in_hdf5 else fields, {})))
+
+
+def _refuse_objects(file: Path) -> None:
+    """Refuse records that are objects, of which a file names the class only."""
+    with library("h5py", file).File(file) as content:
+        kinds = {name: item.attrs.get("MATLAB_class", b"") for name, item in content.items()}
+    objects = [f"{name} ({kind.decode()})" for name, kind in kinds.items() if kind.decode() in _CLASSES]
+    if objects:
+        raise ValueError(
+            f"{file} holds {', '.join(objects)}: the numbers of such objects can be read by MATLAB only. Save vectors, "
+            "such as `t = ts.Time; force = ts.Data; save('run.mat', 't', 'force')`, or write a table by `writetable`."
+        )
 
 
 def _in_order(content: Untyped) -> Untyped:

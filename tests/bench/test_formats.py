@@ -90,6 +90,20 @@ def test_mat(tmp_path, version):
     same(read(path)[0])
 
 
+def test_objects_of_matlab_are_refused_by_name(tmp_path):
+    import h5py
+
+    path = tmp_path / "run.mat"
+    with h5py.File(path, "w", userblock_size=512) as content:
+        for name in ("force", "stroke"):
+            held = content.create_dataset(name, data=np.array([[3707764736, 2, 1, 1, 1, 1]], np.uint32))
+            held.attrs["MATLAB_class"] = np.bytes_("timeseries")
+    with path.open("rb+") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\0\2IM")
+    with pytest.raises(ValueError, match=r"force \(timeseries\), stroke \(timeseries\): .* `t = ts.Time"):
+        read(path)
+
+
 def test_records_of_mat_7_3_come_by_name(tmp_path, monkeypatch):
     """The library lists the fields of HDF5 in another order in each process."""
     import pymatreader
@@ -97,6 +111,7 @@ def test_records_of_mat_7_3_come_by_name(tmp_path, monkeypatch):
     record = {"t_s": T, "x_mm": X, "F_N": F}
     path = tmp_path / "a.mat"
     path.write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\0\2IM")
+    monkeypatch.setattr("jaxdamp.bench.matlab._refuse_objects", lambda _: None)
     monkeypatch.setattr(pymatreader, "read_mat", lambda _: {"warm": record, "cold": record, "hot": record})
     assert read(path).names == ("a/cold", "a/hot", "a/warm")
 
