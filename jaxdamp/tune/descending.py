@@ -61,10 +61,11 @@ class Descent:
         again.
         """
         solver = self._solver(float(self._evaluator.sizes(evaluations[0])[0]), limit_ends(limits))
-        aim = np.zeros(1)
+        aim, held = np.zeros(1), self.task.space.is_held
+        fixed = held if fixed is None else fixed | held
         states = [solver.init(aim, y, now) for y, now in zip(starts, evaluations, strict=True)]
         for state in states:
-            state.fixed, state.open = fixed, fixed is None or not fixed.all()
+            state.fixed, state.open = fixed, not fixed.all()
         histories: list[list[float]] = [[] for _ in states]
         rounds = 0
 

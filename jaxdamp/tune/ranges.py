@@ -11,12 +11,13 @@ from jaxtyping import Bool, Float
 from jaxdamp import _checks
 from jaxdamp._random import sobol_points
 from jaxdamp._tables import with_tied
-from jaxdamp.dampers import not_identified
+from jaxdamp.dampers import AbstractDamper, not_identified
 from jaxdamp.parameters import (
     Coordinates,
     FreeParameters,
     Parameter,
     free_parameters,
+    get,
     match_parameters,
     match_paths,
     name_patterns,
@@ -24,6 +25,7 @@ from jaxdamp.parameters import (
     parameters,
     weight,
 )
+from jaxdamp.tune.shape import curve_velocities
 
 
 Pair = tuple[float, float]
@@ -107,13 +109,18 @@ class SearchRange:
         return np.array([choice is not None for choice in self.choices])
 
     @property
+    def is_held(self) -> Bool[np.ndarray, " free"]:
+        """Which numbers stay at their start."""
+        return self.lower == self.upper
+
+    @property
     def free(self) -> FreeParameters:
         """The free parameters of the vehicle."""
         return self.coordinates.free
 
     def side(self, values: np.ndarray) -> list[str]:
-        """The bound that each value is at: `"lower"`, `"upper"`, or nothing; choices have none."""
-        slack = np.where(self.is_choice, -np.inf, 2 * INSIDE * self.unit)
+        """The bound that each value is at: `"lower"`, `"upper"`, or nothing; choices and held numbers have none."""
+        slack = np.where(self.is_choice | self.is_held, -np.inf, 2 * INSIDE * self.unit)
         low, high = values <= self.lower + slack, values >= self.upper - slack
         return ["lower" if at_low else "upper" if at_high else "" for at_low, at_high in zip(low, high, strict=True)]
 
@@ -151,10 +158,27 @@ def search_range(
     unit = np.concatenate([np.ravel(np.asarray(unit, np.float64)) for unit in coordinates.units])
     numbers = zip(free.names, free.owners, start, unit, strict=True)
     spans = {path: (one.values[0], one.values[-1]) if isinstance(one, Choice) else one for path, one in given.items()}
-    rows = [_one_range(name, p, float(value), size, spans.get(p.path)) for name, p, value, size in numbers]
+    still = _static_forces(vehicle, free)
+    rows = [
+        _one_range(name, p, float(value), size, spans.get(p.path), static)
+        for (name, p, value, size), static in zip(numbers, still, strict=True)
+    ]
     lower, upper, origin = zip(*rows, strict=True)
     choices = _choices(given, free)
     return SearchRange(coordinates, start, unit, np.array(lower), np.array(upper), origin, choices, undetermined)
+
+
+def _static_forces(vehicle: object, free: FreeParameters) -> list[float | None]:
+    """Of each number that is a force of a curve through points, that curve's force [N] at zero velocity."""
+    static: list[float | None] = []
+    for p in free.chosen:
+        owner, _, name = p.path.rpartition(".")
+        law, force = get(vehicle, owner) if owner else vehicle, None
+        if isinstance(law, AbstractDamper) and name in law.constant_forces() and np.ndim(p.value) == 1:
+            points = curve_velocities(law)
+            force = None if points is None else float(np.interp(0.0, points, np.asarray(p.value, float)))
+        static += [force] * p.value.size
+    return static
 
 
 def _choices(given: Mapping[str, Pair | Choice], free: FreeParameters) -> tuple[Choice | None, ...]:
@@ -241,13 +265,13 @@ def _pair(argument: str, name: str, bound: object) -> Pair | Choice:
 
 
 def _one_range(
-    name: str, p: Parameter, value: float, unit: float, given: Pair | None
+    name: str, p: Parameter, value: float, unit: float, given: Pair | None, static: float | None
 ) -> tuple[float, float, tuple[str, str]]:
     """The range of one number of a parameter: the intersection of its domain and its bounds."""
     if given is not None and not given[0] <= value <= given[1]:
         remedy = "Start inside the bounds or widen them."
         _checks.refuse(name, f"start between {given[0]:g} and {given[1]:g} [{p.unit or '-'}]", value, remedy)
-    low, high = _default(p, value) if given is None else given
+    low, high = _default(p, value, static) if given is None else given
     source = "default" if given is None else "given"
     inside = 0.0 if p.command else INSIDE * unit
     edges = p.domain.lower + inside, p.domain.upper - inside
@@ -255,13 +279,17 @@ def _one_range(
     return min(max(low, edges[0]), value), max(min(high, edges[1]), value), where
 
 
-def _default(p: Parameter, value: float) -> Pair:
+def _default(p: Parameter, value: float, static: float | None) -> Pair:
     """The default range, in proportion to the start.
 
     One third to three times the start for numbers of one sign (rates, forces, velocities, exponents, knots); the same
     distance below the start as above it for numbers of either sign (coefficients, offsets); no bound but the domain if
-    the start is zero or has no meaning, as for the weights of a network, and for commands between levels.
+    the start is zero or has no meaning, as for the weights of a network, and for commands between levels. Forces of a
+    curve count from that at zero velocity, which no valve changes and which is held.
     """
+    if static is not None:
+        ends = static + (value - static) / FACTOR, static + FACTOR * (value - static)
+        return min(ends), max(ends)
     if value == 0.0 or p.domain == weight or (p.command and math.isfinite(p.domain.upper)):
         return NO_BOUND
     keeps_sign = p.domain.lower >= 0.0 or p.domain.upper <= 0.0 or p.domain.ordered

@@ -36,7 +36,9 @@ class Design(Free, total=False):
         limits: hard limits `{metric: largest value}` or `{metric: (smallest, largest)}` in the metric's unit, such as
             `{"working_space_peak_to_peak": 0.1}`, with a name or a `metrics.Metric`; in every scenario. `"+10%"` is
             relative to the start on the same road.
-        shape: constraints on the force-velocity curve: `slope`, `monotone`, `ratio`, `knee`.
+        shape: constraints on the force-velocity curve: `slope`, `monotone`, `ratio`, `knee`. If left out, the force of
+            tables, splines and polynomials does not fall as the velocity grows, or not more steeply than at the start:
+            their numbers could make a damper that drives the motion. `()` for none.
         metrics: further metrics, which functions and limits can use by name.
 
     >>> from jaxdamp import roads, tune, vehicles
@@ -49,7 +51,7 @@ class Design(Free, total=False):
     bounds: Mapping[str, Bound] | None
     tie: Mapping[str, str] | None
     limits: Limits | None
-    shape: Sequence[Shape] | Shape
+    shape: Sequence[Shape] | Shape | None
     metrics: Sequence[str | Metric]
 
 
@@ -75,7 +77,7 @@ class Settings(Design, Run, Search, total=False):
 
 
 DEFAULTS: Settings = {
-    "over": None, "freeze": (), "bounds": None, "tie": None, "limits": None, "shape": (), "metrics": (), **RUN,
+    "over": None, "freeze": (), "bounds": None, "tie": None, "limits": None, "shape": None, "metrics": (), **RUN,
     "starts": 1, "seed": 0, "max_steps": 100, "fresh_roads": 32,
 }  # fmt: skip
 LEAST = {"points": 1, "between": 0, "starts": 1, "seed": 0, "max_steps": 1, "fresh_roads": 0}  # of the counts

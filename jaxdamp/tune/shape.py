@@ -14,8 +14,8 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Scalar
-from jaxdamp.dampers import AbstractDamper, laws_inside
-from jaxdamp.parameters import get, matching
+from jaxdamp.dampers import AbstractDamper, AbstractMemoryless, laws_inside
+from jaxdamp.parameters import FreeParameters, get, matching, real
 from jaxdamp.tune.limits import Limit, scaled
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -37,6 +37,7 @@ class Shape:
     numbers: Callable[[Curve, Curve], Array]  # those that are limited, from velocities and forces
     places: tuple[str, ...] = ("",)  # of the numbers, in words; empty for a single one
     dampers: str = "*"  # the laws, by their path in the vehicle or a pattern
+    eased: bool = False  # whether a number that lies outside at the start may stay where it is
 
     def at(self, dampers: str) -> "Shape":
         """The same for some of the dampers of the vehicle only, such as `"front.*"`."""
@@ -129,8 +130,12 @@ class ShapeNumbers(NamedTuple):
     pairs: tuple[tuple[Shape, str], ...]  # each constraint with the path of a law
 
     @classmethod
-    def of(cls, vehicle: AbstractVehicle, shape: Sequence[Shape] | Shape) -> "ShapeNumbers":
-        """Those of the laws of a vehicle that the constraints name."""
+    def of(
+        cls, vehicle: AbstractVehicle, shape: Sequence[Shape] | Shape | None, free: FreeParameters
+    ) -> "ShapeNumbers":
+        """Those of the laws of a vehicle that the constraints name; by default, free curves do not fall."""
+        if shape is None:
+            shape = _rising(vehicle, free)
         shapes = [shape] if isinstance(shape, Shape) else shape
         if not isinstance(shapes, Sequence) or isinstance(shapes, str):
             remedy = "Write `shape=[tune.monotone(), tune.slope(upper=5000.0)]`."
@@ -164,9 +169,43 @@ class ShapeNumbers(NamedTuple):
         for shape, path in self.pairs:
             names = _names(shape, path)
             size = scaled(*shape.span, max(abs(start[name]) for name in names))
-            of = f"{shape.name} of {path}"
-            limits += [Limit(name, of, *shape.span, size, shape.unit, is_shape=True) for name in names]
+            of, (lower, upper) = f"{shape.name} of {path}", shape.span
+            for name in names:
+                span = (min(lower, start[name]), max(upper, start[name])) if shape.eased else shape.span
+                limits.append(Limit(name, of, *span, size, shape.unit, is_shape=True))
         return limits
+
+
+def _rising(vehicle: AbstractVehicle, free: FreeParameters) -> list[Shape]:
+    """That the force does not fall between the points of curves whose free numbers have either sign, such as tables.
+
+    Without this a search finds curves that drive the motion, which no damper does. Where one falls at the start, it
+    does not fall more steeply.
+    """
+    shapes = []
+    for path in damper_paths(vehicle):
+        inside = (law for at, law in laws_inside(get(vehicle, path), f"{path}.") if _moves_curve(law, at, free))
+        grids = [points for law in inside if (points := curve_velocities(law)) is not None]
+        if grids:
+            velocities = np.unique(np.concatenate(grids))
+            places = tuple(f" at {0.5 * (a + b):.2g} m/s" for a, b in itertools.pairwise(velocities))
+            span, points = (0.0, math.inf), tuple(map(float, velocities))
+            shapes.append(Shape("slope", "N s/m", span, points, _slopes, places, path, eased=True))
+    return shapes
+
+
+def _moves_curve(law: AbstractDamper, path: str, free: FreeParameters) -> bool:
+    """Whether numbers of a law of velocity alone are free that may have either sign."""
+    moved = (p.path.startswith(path) and "." not in p.path.removeprefix(path) for p in free.chosen if p.domain == real)
+    return isinstance(law, AbstractMemoryless) and any(moved)
+
+
+def curve_velocities(law: AbstractDamper) -> Float[np.ndarray, " points"] | None:
+    """The velocities [m/s] of the points of a curve, or some in its range; None of a law without such settings."""
+    declared = {field.name: field.metadata.get("setting", {}).get("unit") for field in dataclasses.fields(law)}
+    own = (np.asarray(getattr(law, name), float) for name, unit in declared.items() if unit == "m/s")
+    points = next((values for values in own if values.ndim == 1), None)
+    return points if points is None or points.size > 2 else np.linspace(points[0], points[-1], POINTS + 1)
 
 
 def damper_paths(vehicle: AbstractVehicle) -> list[str]:

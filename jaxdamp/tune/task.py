@@ -142,7 +142,7 @@ class DesignTask(Generic[V]):
         self.tolerance = DOUBLE if self.space.free.values.dtype == np.float64 else SINGLE
         self.measured = Measurement(
             vehicle, road, self.objective, self.space.free,
-            each=list(self.allowed), curves=ShapeNumbers.of(vehicle, settings["shape"]), run=self.run,
+            each=list(self.allowed), curves=ShapeNumbers.of(vehicle, settings["shape"], self.space.free), run=self.run,
         )  # fmt: skip
         self.names, self.units = self.measured.names, self.objective.units(vehicle)
 

@@ -143,3 +143,15 @@ def test_a_smooth_peak_is_near_the_peak_in_any_unit_and_precision(precision, siz
         np.testing.assert_allclose(value, expected, rtol=1e-4 if precision is np.float32 else 1e-11)
     slopes = jax.grad(lambda y: statistic.of(y, 0.05))(jnp.asarray(wave))
     assert np.all(np.isfinite(slopes))
+
+
+@pytest.mark.parametrize("kind", [dampers.Table, dampers.SplineTable])
+def test_a_tuned_curve_through_points_drives_no_motion(kind):
+    """Its force rises with the velocity from the same static force, unless another shape is asked for."""
+    velocity = np.array([-0.6, -0.3, -0.1, 0.0, 0.1, 0.3, 0.6])
+    law = kind(velocity, np.array([-950.0, -800.0, -400.0, -30.0, 500.0, 1300.0, 1700.0]))
+    car = vehicles.presets.quarter_car_000(law)
+    result = tune.minimise("comfort", car, ROAD, fresh_roads=0, max_steps=30, **RUN)
+    forces = np.asarray(result.vehicle.damper.force_points)
+    assert np.all(np.diff(forces) > -1e-2) and forces[3] == pytest.approx(-30.0)
+    assert result.after[result.metric] < 0.99 * result.before[result.metric]
