@@ -19,7 +19,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import IO, Generic, TypeAlias, TypeVar, cast
+from typing import IO, Generic, NoReturn, TypeAlias, TypeVar, cast
 
 from jaxdamp._forked import started
 from jaxdamp._one_thread import usable_cores
@@ -291,17 +291,29 @@ def _forked(prepare: Callable[[], object]) -> Process:
     try:
         signal.set_wakeup_fd(-1)
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C of a terminal goes to both: the other side decides
+        sys.unraisablehook = _ended_in_callback
         signal.signal(signal.SIGTERM, lambda number, frame: sys.exit())
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         here.close()
         _serve(there.makefile("rwb"), prepare)
         code = 0
     finally:  # never back into the command
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
-        atexit._run_exitfuncs()
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(code)
+        _end(code)
+
+
+def _end(code: int) -> NoReturn:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    atexit._run_exitfuncs()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
+
+
+def _ended_in_callback(unraisable: "sys.UnraisableHookArgs") -> None:
+    """Python drops what is raised in a `__del__` or in the callback of a weak reference, the end of a process too."""
+    if issubclass(unraisable.exc_type, SystemExit):
+        _end(1)
+    sys.__unraisablehook__(unraisable)
 
 
 def _serve(stream: io.BufferedRWPair, prepare: Callable[[], object]) -> None:

@@ -9,7 +9,7 @@ from jaxdamp import _second_process
 
 
 SCRIPT = """
-import os, signal, sys, threading, time
+import os, signal, sys, threading, time, weakref
 from jaxdamp import _second_process as second
 
 class Record:
@@ -58,6 +58,18 @@ def deaf():
     time.sleep(60.0)
 with second.opened(lambda: None):
     second.elsewhere(deaf)
+inside, outside = os.pipe()
+class Forgotten: pass
+def forgets():
+    def last(reference):
+        os.write(outside, b".")
+        time.sleep(60.0)
+    thing = Forgotten()
+    reference = weakref.ref(thing, last)
+    del thing
+with second.opened(lambda: None):
+    second.elsewhere(forgets)
+    os.read(inside, 1)  # it ends inside the callback, and says nothing
 import jax
 jax.devices()
 with second.opened(lambda: None):

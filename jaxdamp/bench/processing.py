@@ -64,12 +64,16 @@ class Steps:
         """Both, where they agree: windows are intersected, of two numbers of last cycles the smaller one is taken.
 
         Raises:
-            ValueError: a window is asked for when cycles are chosen already, because then it would be another choice;
-                or one step with two values.
+            ValueError: a window is asked for when cycles are chosen already, or cycles to be left out after the last
+                ones were chosen, because then it would be another choice; or one step with two values.
         """
         if more.between is not None and (self.skip_cycles, self.last_cycles) != (None, None):
             remedy = "Cut in time first, or begin with `run.raw`: cycles are counted in the part that is kept."
             _checks.refuse("between", "be given before cycles are chosen", more.between, remedy)
+        if more.skip_cycles and self.last_cycles is not None:
+            both = f"`process(skip_cycles={more.skip_cycles}, last_cycles={self.last_cycles})`"
+            remedy = f"Begin with `run.raw` and give both in one call, {both}; or choose fewer last cycles."
+            _checks.refuse("skip_cycles", "be given before or with `last_cycles`", more.skip_cycles, remedy)
         merged: dict[str, object] = {}
         for field in fields(self):
             old, new = getattr(self, field.name), getattr(more, field.name)

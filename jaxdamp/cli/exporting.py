@@ -172,6 +172,11 @@ def _grid(law: AbstractDamper, text: str | None) -> np.ndarray:
         return grid
     try:
         low, high, points = text.split(":")
-        return np.linspace(float(low), float(high), int(points))
+        grid = np.linspace(float(low), float(high), int(points))
+        if grid.size == 0 or np.any(np.diff(grid) <= 0):
+            raise ValueError
     except ValueError:
-        _checks.refuse("velocities", "be FROM:TO:POINTS in m/s", repr(text), "Write for example -0.6:0.8:41.")
+        must = "be FROM:TO:POINTS in m/s, rising from FROM to TO"
+        _checks.refuse("velocities", must, repr(text), "Write for example -0.6:0.8:41.")
+    grid[np.abs(grid) < 1e-9 * np.ptp(grid)] = 0.0  # a rounding error
+    return grid

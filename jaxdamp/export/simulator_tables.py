@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
@@ -46,6 +47,7 @@ def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vector
     points = sorted(zip(units[0](table.velocity), units[1](table.force), strict=True))
     rows = [f"{float(v) + 0.0!r},{float(f) + 0.0!r}" for v, f in points]  # no -0.0
     about, *others = table.comments  # the numbers of a law are in SI whatever is shown
+    others += _static_line(table, "in the table")
     comments = [f"# {about}", *(f"# {shown.words(line)}" for line in others)]
     heading = ",".join(f"{name} [{unit.unit}]" for name, unit in zip(("velocity", "force"), units, strict=True))
     return _written(path, "\n".join([*comments, heading, *rows]) + "\n", table)
@@ -56,6 +58,7 @@ class SettledTable(NamedTuple):
 
     velocity: np.ndarray  # [m/s], positive in rebound, shape (points,)
     force: np.ndarray  # [N], positive when it resists extension, shape (points,)
+    static: float  # [N], the force at rest at stroke zero, in the same sense; 0 unless a gas or a spring gives one
     comments: list[str]  # lines of text
     left_out: str  # the rows that were left out and why; empty if there are none
 
@@ -70,7 +73,7 @@ def settled_table(law: AbstractDamper, velocities: VectorLike, call: str, *, tur
     _checks.finite("velocities", velocity)
     if velocity.ndim != 1 or velocity.size == 0 or np.any(np.diff(velocity) <= 0):
         _checks.refuse("velocities", "be one or more, strictly increasing", velocity, "Try `numpy.unique`.")
-    curve = quasi_static(law, velocity)
+    curve, rest = quasi_static(law, velocity), jnp.zeros(())
     if not set(np.sign(velocity)) - {0.0} <= set(np.sign(velocity[curve.settled])):  # a whole side is missing
         remedy = "A table cannot represent such a law: use `respond` with the intended motion."
         what = f"{type(law).__name__}. {curve.note.removesuffix('.')}"
@@ -92,9 +95,17 @@ def settled_table(law: AbstractDamper, velocities: VectorLike, call: str, *, tur
     ]
     if curve.note:
         comments.append(f"rows left out{', with rebound counted positive' * turned}: {curve.note}")
-    settled = velocity[curve.settled]
+    settled, force = velocity[curve.settled], np.asarray(curve.force)[curve.settled]
     comments += _range_lines(law, settled, turned=turned)
-    return SettledTable(settled, np.asarray(curve.force)[curve.settled], comments, curve.note)
+    static = float(law.force(rest, rest, law.initial_state()))
+    static *= abs(static) > 1e-9 * np.abs(force).max(initial=0.0)  # less is a rounding error
+    return SettledTable(settled, force, static, comments, curve.note)
+
+
+def _static_line(table: SettledTable, where: str) -> list[str]:
+    """A comment on the static force, in words that hold for either sign convention."""
+    way = "pushes the rod out" if table.static < 0 else "pulls the rod in"
+    return [f"static force of {abs(table.static):.4g} N, which {way} at stroke zero, is {where}"] * bool(table.static)
 
 
 def _written(path: str | os.PathLike[str], content: str | bytes, table: SettledTable) -> Path:
@@ -242,8 +253,9 @@ def to_assetto_corsa(
     """Write a law as the six damper values of `suspensions.ini` of Assetto Corsa, to paste into an axle's section.
 
     The game has two straight lines through zero in each direction: a slow rate up to a threshold and a fast rate beyond
-    it. They are fitted to the table by least squares; the comments state the misfit, besides those of `to_adams`. Rates
-    are at the wheel: a damper rate counts with the square of the motion ratio, a threshold with its inverse.
+    it. They are fitted by least squares to the table without the static force, such as that of a gas, which belongs to
+    the spring; the comments state it and the misfit, besides those of `to_adams`. Rates are at the wheel: a damper rate
+    counts with the square of the motion ratio, a threshold with its inverse.
 
     Arguments:
         law: the law.
@@ -256,15 +268,20 @@ def to_assetto_corsa(
         The path of the file.
 
     Raises:
-        ValueError: as `to_csv`; fewer than three velocities in a direction; a motion ratio that is not positive.
+        ValueError: as `to_csv`; fewer than three velocities in a direction; a motion ratio that is not positive; a law
+            whose force does not change with the velocity, such as a spring.
     """
     _checks.positive("motion_ratio", motion_ratio)
-    table = _table(law, velocities, "to_assetto_corsa(law, path, velocities)")
+    table = _table(law, velocities, "to_assetto_corsa(law, path, velocities)", "left out: it belongs to the spring")
+    damping = np.where(np.isclose(table.force, table.static, rtol=1e-9, atol=0.0), 0.0, table.force - table.static)
+    if not damping.any():
+        remedy = "The file would hold no damping: give the damper, and the rate of the spring to `SPRING_RATE`."
+        _checks.refuse("law", "have a force that changes with the velocity", law, remedy)
     lines = [f"; {line}" for line in table.comments]
     lines.append(f"; rates at the wheel, for {motion_ratio:g} m of the damper for 1 m of the wheel")
     for name, sign in (("BUMP", -1.0), ("REBOUND", 1.0)):
         inside = sign * table.velocity > 0
-        speed, force = sign * table.velocity[inside], sign * table.force[inside]
+        speed, force = sign * table.velocity[inside], sign * damping[inside]
         if speed.size < 3:
             must = f"hold three velocities or more in {'compression' if sign < 0 else 'rebound'}"
             _checks.refuse("velocities", must, table.velocity, table.left_out)
@@ -286,16 +303,17 @@ def _two_lines(speed: np.ndarray, force: np.ndarray) -> tuple[float, float, floa
     for threshold in np.unique(speed)[:-1]:
         parts = np.stack([np.minimum(speed, threshold), np.maximum(speed - threshold, 0.0)], axis=1)
         (slow, fast), error = nnls(parts, force)
-        lines.append((float(slow), float(fast), float(threshold), float(error / np.linalg.norm(force))))
+        lines.append((float(slow), float(fast), float(threshold), float(error / (np.linalg.norm(force) or 1.0))))
     return min(lines, key=lambda line: line[-1])
 
 
-def _table(law: AbstractDamper, velocities: VectorLike, call: str) -> SettledTable:
-    """The settled table, with comments on its range and on what it leaves out."""
+def _table(law: AbstractDamper, velocities: VectorLike, call: str, static: str = "in the table") -> SettledTable:
+    """The settled table, with comments on its static force, on its range and on what it leaves out."""
     table = settled_table(law, velocities, call)
     low, high = table.velocity[[0, -1]]
     limits = f"range: {low:g} to {high:g} m/s; beyond it the program that reads the table extrapolates"
-    return table._replace(comments=[*table.comments, limits, *_left_out(law, table)])
+    comments = [*table.comments, *_static_line(table, static), limits, *_left_out(law, table)]
+    return table._replace(comments=comments)
 
 
 def _left_out(law: AbstractDamper, table: SettledTable) -> list[str]:

@@ -112,6 +112,9 @@ def posterior(evidence: Evidence, samples: int, warm_up: int, chains: int, seed:
             _checks.refuse(name, "be 2 or more", count)
     potential, physical = _potential(evidence)
     begin = APART * np.random.default_rng(seed).uniform(-1.0, 1.0, (chains, evidence.minimum.values.size))
+    if not bool(jnp.any(jax.vmap(potential)(jnp.asarray(begin)) < REFUSED)):
+        must, remedy = "have finite forces or numbers about its minimum", "Freeze parameters, or give `bounds`."
+        _checks.refuse("the fit", must, "one without any at the starts of the chains", remedy)
     kernel = NUTS(potential_fn=potential, forward_mode_differentiation=True)
     side_by_side = {"num_chains": chains, "chain_method": "vectorized", "progress_bar": False}
     sampler = MCMC(kernel, num_warmup=warm_up, num_samples=samples, **side_by_side)
@@ -141,7 +144,8 @@ def _potential(evidence: Evidence) -> tuple[Callable[[Array], Array], Callable[[
 
     The prior is flat in the physical values, within their domains; conditions between them do not count here. With the
     level of the noise unknown and ν degrees of freedom, the likelihood is (1 + χ²/ν)^(−(ν + p)/2), χ² being the
-    increase over the minimum; for a linear law that is Student's distribution with the covariance of the fit.
+    increase over the minimum; for a linear law that is Student's distribution with the covariance of the fit. With a
+    known level, ν is infinite and the likelihood exp(−χ²/2).
     """
     problem, noise, centre = evidence.problem, evidence.noise, evidence.minimum.values
     if not np.all(np.isfinite(evidence.covariance)):
@@ -172,7 +176,8 @@ def _potential(evidence: Evidence) -> tuple[Callable[[Array], Array], Callable[[
         model = problem.free.build(values)
         residual = weight * jnp.concatenate([part(model) for part in problem.residuals])
         rise = jnp.sum(residual**2) - least
-        energy = power * jnp.log1p(jnp.maximum(rise, -0.5 * noise.dof) / noise.dof) - jnp.linalg.slogdet(stretch)[1]
+        student = power * jnp.log1p(jnp.maximum(rise, -0.5 * noise.dof) / noise.dof)
+        energy = (student if np.isfinite(noise.dof) else 0.5 * rise) - jnp.linalg.slogdet(stretch)[1]
         return jnp.where(jnp.isfinite(energy), energy, REFUSED)
 
     return potential, physical

@@ -29,7 +29,7 @@ class AbstractChart(ABC):
         """What is drawn, above and below the centre, after each number; numbers that are missing change nothing.
 
         Arguments:
-            scores: distances from the centre in standard deviations, NaN where there is none.
+            scores: distances from the centre in standard deviations, NaN or infinite where there is none.
         """
 
     @property
@@ -117,7 +117,7 @@ class Ewma(AbstractChart):
         """The average after each number."""
         z, after = 0.0, np.empty(scores.size)
         for i, score in enumerate(scores):
-            z = z if math.isnan(score) else z + self.weight * (score - z)
+            z = z + self.weight * (score - z) if math.isfinite(score) else z
             after[i] = z
         return after, after
 
@@ -168,7 +168,7 @@ class Cusum(AbstractChart):
         """C⁺ and −C⁻ after each number."""
         high, low, after, most = 0.0, 0.0, np.empty((2, scores.size)), 2.0 * self.decision
         for i, score in enumerate(scores):
-            if not math.isnan(score):
+            if math.isfinite(score):
                 high = min(max(0.0, high + score - self.reference), most)
                 low = min(max(0.0, low - score - self.reference), most)
             after[:, i] = high, -low

@@ -18,7 +18,7 @@ from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.residuals import AbstractResiduals
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution
-from jaxdamp.parameters import FreeParameters, get, match_paths
+from jaxdamp.parameters import FreeParameters, get, match_paths, matching, parameters
 
 
 ROUNDS = 20  # of least squares with new weights, at most
@@ -100,16 +100,36 @@ class Priors(AbstractResiduals):
 def priors_on(free: FreeParameters, priors: Mapping[str, tuple[float, float]]) -> tuple[Priors, ...]:
     """The residuals of stated priors `{name: (mean, standard deviation)}`, for weighted samples with the noise 1."""
     chosen: dict[str, tuple[float, float]] = {}
+    named: dict[str, str] = {}
+    paths = [p.path for p in free.chosen]
     for name, pair in priors.items():
         if np.shape(pair) != (2,) or not np.all(np.isfinite(pair)) or not pair[1] > 0:
             must = "be a mean and a positive standard deviation"
             _checks.refuse(f"priors[{name!r}]", must, pair, "Write {'rebound_rate': (2500.0, 200.0)}.")
-        chosen |= dict.fromkeys(match_paths([p.path for p in free.chosen], [name]), (float(pair[0]), float(pair[1])))
+        if not matching(paths, name):
+            _refuse_held(free, name)
+        for path in match_paths(paths, [name]):
+            if path in named:
+                both, remedy = f"two, of {named[path]!r} and {name!r}", "Write names in place of patterns that overlap."
+                _checks.refuse("priors", f"give {path} one prior", both, remedy)
+            named[path], chosen[path] = name, (float(pair[0]), float(pair[1]))
     if not chosen:
         return ()
     mean, deviation = (jnp.asarray(np.array(side)) for side in zip(*chosen.values(), strict=True))
     size = sum(p.value.size for p in free.chosen if p.path in chosen)
     return (Priors(tuple(chosen), mean, deviation, size, jnp.asarray(1.0)),)
+
+
+def _refuse_held(free: FreeParameters, name: str) -> None:
+    """Refuse the prior of a parameter that is tied or frozen; one that does not exist is refused with other names."""
+    argument, must, leaders = f"priors[{name!r}]", "be of a parameter that is free", dict(free.ties)
+    for path in matching(list(leaders), name):
+        remedy = f"Give the prior of {leaders[path]!r}."
+        _checks.refuse(argument, must, f"of {path}, which is tied to {leaders[path]}", remedy)
+    known = list(free.tree) if isinstance(free.tree, dict) else [p.path for p in parameters(free.tree, commands=True)]
+    for path in matching(known, name):
+        remedy = "Leave its prior out, or free it by `freeze`, `over` or `rig`."
+        _checks.refuse(argument, must, f"of {path}, which is frozen", remedy)
 
 
 class Round(NamedTuple):

@@ -180,7 +180,8 @@ def control_charts(
 
     Arguments:
         dampers: of `identify.fit_many`; or numbers of your own for each damper by name, such as forces at a velocity.
-        baseline: how many dampers at the beginning were in control, or their names; 25 or more.
+        baseline: how many dampers at the beginning were in control, or their names, each that of one
+            damper; 25 or more.
         charts: individuals at 3, EWMA with λ = 0.2 and L = 3, and CUSUM with k = 0.5 and h = 5 if left out.
         names: of the dampers, if `dampers` are numbers.
 
@@ -188,7 +189,8 @@ def control_charts(
         The charts: `summary`, a row for each damper in `table()`, `signals`, and a page by `report(path)`.
 
     Raises:
-        ValueError: no numbers, or not as many of each; a baseline of fewer than 8 dampers, unknown, or all alike.
+        ValueError: no numbers, or not as many of each; a baseline of fewer than 8 dampers, unknown, repeated or all
+            alike.
 
     >>> rng = np.random.default_rng(0)
     >>> force = 1000.0 + 5.0 * rng.standard_normal(120)
@@ -259,7 +261,7 @@ def _given(
 
 def _baseline(baseline: int | Sequence[str], labels: Sequence[str]) -> np.ndarray:
     """The places of the dampers of the baseline."""
-    if isinstance(baseline, int):
+    if isinstance(baseline, int | np.integer):
         if len(labels) < FEWEST:
             must = f"be {FEWEST} dampers or more, and there are {len(labels)}"
             _checks.refuse("baseline", must, baseline, "Control charts need a longer line.")
@@ -267,7 +269,17 @@ def _baseline(baseline: int | Sequence[str], labels: Sequence[str]) -> np.ndarra
             must = f"be from {FEWEST} to {len(labels)} dampers"
             _checks.refuse("baseline", must, baseline, "25 or more give limits that hold.")
         return np.arange(baseline)
-    place = {name: i for i, name in enumerate(labels)}
+    places: dict[str, list[int]] = {}
+    for i, label in enumerate(labels):
+        places.setdefault(label, []).append(i)
+    found = []
     for name in baseline:
-        _checks.one_of("baseline", name, place)
-    return np.array(sorted(place[name] for name in baseline))
+        _checks.one_of("baseline", name, places)
+        if len(places[name]) > 1:
+            at = ", ".join(str(i + 1) for i in places[name])
+            remedy = "Give labels that differ, or the number of dampers at the beginning."
+            _checks.refuse("baseline", "name dampers whose label is theirs alone", f"{name!r}, of numbers {at}", remedy)
+        if places[name][0] in found:
+            _checks.refuse("baseline", "name each damper once", f"{name!r} repeatedly", "Remove the repeated names.")
+        found += places[name]
+    return np.array(sorted(found))

@@ -131,7 +131,11 @@ class OwnNames(NamedTuple):
         if not isinstance(given, Mapping):
             return given  # refused in words of its own where it is used
         values = [self._one(argument, value) if isinstance(value, str) else value for value in given.values()]
-        return dict(zip(self.find(argument, list(given)), values, strict=True))  # type: ignore[arg-type]
+        names = self.find(argument, list(given))
+        if len(set(names)) < len(names):
+            two = [written for written, name in zip(given, names, strict=True) if names.count(name) > 1]
+            _checks.refuse(argument, "name each number once", " and ".join(map(repr, two)), "Keep one of them.")
+        return dict(zip(names, values, strict=True))  # type: ignore[arg-type]
 
     def _one(self, argument: str, name: str) -> str:
         if not self.alone:

@@ -63,11 +63,14 @@ class Evidence(NamedTuple):
         return float(scipy.special.stdtrit(self.noise.dof, 0.975))
 
     def draws(self, count: int, seed: int) -> Float[np.ndarray, "draws free"]:
-        """Values of the free numbers as the fit leaves them possible: Student's t within domains and conditions."""
+        """Values of the free numbers as the fit leaves them possible: Student's t within domains and conditions.
+
+        Of infinite degrees of freedom, which a known noise has, it is the normal distribution.
+        """
         if not np.all(np.isfinite(self.covariance)):
             remedy = "Freeze the parameters that do not change the force."
             _checks.refuse("samples", "be drawn from finite standard errors", "infinite for some parameters", remedy)
-        rng, free = np.random.default_rng(seed), self.problem.free
+        rng, free, dof = np.random.default_rng(seed), self.problem.free, self.noise.dof
         errors = np.sqrt(np.diag(self.covariance))
         scale = np.where(errors > 0, errors, 1.0)
         values, vectors = np.linalg.eigh(self.covariance / np.outer(scale, scale))
@@ -76,7 +79,7 @@ class Evidence(NamedTuple):
         limited = any(law.has_conditions() for _, law in laws_inside(free.tree))
         drawn: list[np.ndarray] = []
         for _ in range(MOST_DRAWS):
-            spread = np.sqrt(rng.chisquare(self.noise.dof, (count, 1)) / self.noise.dof)
+            spread = np.sqrt(rng.chisquare(dof, (count, 1)) / dof) if np.isfinite(dof) else 1.0
             values = self.minimum.values + rng.standard_normal((count, len(half))) @ half.T / spread
             inside = values[np.all((values >= lower) & (values <= upper), axis=1)]
             drawn += [v for v in inside if not limited or keeps_conditions(free.started_at(v).tree)]

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from jaxdamp.dampers import PiecewiseLinear, SplineTable, Table, laws_inside
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.traces import signals
@@ -18,6 +19,7 @@ KNEES = 12  # of a curve of the velocity
 FEWEST = 8  # samples of a record
 SHORT = 50.0  # sampling steps for each time constant below which a filter and a delay are one
 OF_LAW = ("curve", "hysteresis")  # effects that no machine has
+FREE_CURVES = (PiecewiseLinear, SplineTable, Table)
 PLAY = "look for play in the mounts, or put the law into `Play`"
 
 Values = Float[np.ndarray, " samples"]
@@ -140,7 +142,7 @@ def proportional(problem: Problem, records: Sequence[Record]) -> list[Pattern]:
         Pattern(name, column(records, change), signed, lambda sizes, words=words: words.format(*sizes), remedy)
         for name, signed, words, remedy, change in kinds
     ]
-    return [*patterns, *_gains(problem, records), _curve(records)]
+    return [*patterns, *_gains(problem, records), _curve(problem, records)]
 
 
 def _heated(motion: Motion) -> Values:
@@ -173,13 +175,15 @@ def _gains(problem: Problem, records: Sequence[Record]) -> list[Pattern]:
     return patterns
 
 
-def _curve(records: Sequence[Record]) -> Pattern:
+def _curve(problem: Problem, records: Sequence[Record]) -> Pattern:
     """Another curve of the velocity, by straight lines between knees that each have as many samples."""
     velocity = np.concatenate([record.motion.velocity for record in records])
     knees = np.unique(np.quantile(velocity, np.linspace(0.0, 1.0, KNEES)))
     units = np.eye(knees.size)
     parts = [column(records, lambda m, unit=unit: np.interp(m.velocity, knees, unit)) for unit in units]
     remedy = "take a law with a free curve, such as piecewise_linear or table"
+    if any(isinstance(law, FREE_CURVES) for _, law in laws_inside(problem.law)):
+        remedy = "give the law's curve more points, or take a law with memory, such as besinger_series_spring"
     words = "the shape of the damper's curve over the velocity"
     at_rest = np.array([float(np.interp(0.0, knees, unit)) for unit in units])
     return Pattern("curve", np.concatenate(parts, axis=1), True, lambda sizes: words, remedy, at_rest)

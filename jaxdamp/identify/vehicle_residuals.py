@@ -1,6 +1,7 @@
 """The residuals of a vehicle: its records, measured or virtual, and bench records of its damper."""
 
 import dataclasses
+import math
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Unpack, final
@@ -185,16 +186,18 @@ class VirtualRideSettings(SimulationSettings, total=False):
 
     Arguments:
         name: name of the record; noise depends on it and on the seed only.
-        finer: steps of the simulation in a sampling interval.
+        finer: steps of the simulation in a sampling interval; as many as give steps of at most 1 ms, two at least, if
+            left out.
     """
 
     name: str
-    finer: int
+    finer: int | None
 
 
+LONGEST_STEP = 1e-3  # s, of virtual records
 WITHOUT_STEP: SimulationSettings = {**SIMULATION}
 del WITHOUT_STEP["dt"]
-VIRTUAL_RIDE: VirtualRideSettings = {**WITHOUT_STEP, "name": "virtual ride", "finer": 2}
+VIRTUAL_RIDE: VirtualRideSettings = {**WITHOUT_STEP, "name": "virtual ride", "finer": None}
 
 
 @of_known_numbers
@@ -249,6 +252,8 @@ def virtual_ride(
         _checks.nonnegative(f"channels[{channel!r}]", deviation)
     for channel in sensors or {}:
         _checks.one_of("sensors", channel, channels)
+    _checks.counts(finer=finer)
+    finer = finer or max(math.ceil(1.0 / (LONGEST_STEP * sampling_rate) - 1e-6), 2)
     dt = 1.0 / (finer * sampling_rate)
     response = simulate(vehicle, road, **{**part(settings, WITHOUT_STEP), "dt": dt})
     rng = np.random.default_rng([seed, zlib.crc32(name.encode())])

@@ -285,14 +285,13 @@ def test_limits_know_the_unit_of_every_quantity(evaluation, two_settings):
         ("name,minimum\nx,1\n", "line 1: there is no column 'quantity'"),
         ("quantity,least\nx,1\n", "column 'least' is unknown"),
         ("quantity,minimum\nfriction,1\ngas force,five\n", "line 3: the minimum is 'five', which is no number"),
-        (
-            "quantity,minimum [mm]\nfriction,1\n",
-            "line 2: .*`minimum` must have a unit of 'friction' .*'N', but is 'mm'",
-        ),
+        ("quantity,minimum [mm]\nfriction,1\n", "2: .*`minimum` must have a unit of 'friction' .*'N', but is 'mm'"),
         ("quantity,minimum [N]\nrebound/compression ratio,2\n", "`minimum` must have no unit for 'rebound/compression"),
         ("quantity,velocity,minimum\nrebound force,-0.1,1\n", "`velocity` must be positive"),
         ("quantity;minimum\nfriction;1,200\n", "line 2: the comma in '1,200' may be a decimal sign"),
         ("quantity,minimum,maximum\nfriction,,\n", "line 2: .*`minimum` must be given"),
+        ("quantity,minimum,maximum\nfriction,1,2\nfriction,nan,2\n", "line 3: .*`minimum` must be finite, but is nan"),
+        ("quantity,minimum,maximum\nfriction,1,inf\n", "line 2: .*`maximum` must be finite.*Leave it out where"),
         ("quantity,minimum,maximum\nfriction,3,2\n", "line 2: .*`minimum` must be at most"),
     ],
 )

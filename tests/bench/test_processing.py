@@ -141,6 +141,12 @@ def test_where_the_order_would_matter_it_is_refused():
         ValueError, match=r"`low_pass` must be given once, but is 50.0 after 60.0. Begin with `run.raw`"
     ):
         run.process(low_pass=60.0).process(low_pass=50.0)
+    for steps in ({"last_cycles": 3}, {"skip_cycles": 1, "last_cycles": 3}):
+        with pytest.raises(
+            ValueError, match=r"`skip_cycles` must .*in one call, `process\(skip_cycles=1, last_cycles=3"
+        ):
+            run.process(**steps).process(skip_cycles=1)
+    same(run.process(skip_cycles=1).process(last_cycles=3), run.process(skip_cycles=1, last_cycles=3))
     for cut in (run.between(1.0, 4.0), run.last_cycles(2)):
         assert cut.raw is run
         with pytest.raises(ValueError, match="`low_pass` must be asked for before a record is cut"):

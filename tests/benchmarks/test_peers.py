@@ -202,7 +202,8 @@ def test_finite_differences_agree_with_derivatives():
 def test_diffrax_agrees_with_c(case: str):
     parameters, road = some(case, cars=2)
     exact = c.rk4(case, parameters, road, substeps=24)
-    saved = diffrax_vmapped.rms(case, parameters, road, at_instants=True)
+    substeps = 2 * diffrax_vmapped.SUBSTEPS[case]  # at single steps the kinks of Bouc-Wen leave just 1e-5
+    saved = diffrax_vmapped.rms(case, parameters, road, at_instants=True, substeps=substeps)
     assert np.max(problem.errors(saved, exact)) < 1e-5
     # the mean over time is not quite that over instants
     assert np.max(problem.errors(diffrax_vmapped.rms(case, parameters, road), exact)) < 1e-3

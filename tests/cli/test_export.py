@@ -101,6 +101,9 @@ def test_refusals(law: Path) -> None:
     folder = law.parent
     assert "Option --to must be one of" in refused(folder, "export", law, "--to", "adam")
     assert "--velocities must be FROM:TO:POINTS" in refused(folder, "export", law, "--to", "csv", "--velocities", "1")
+    for text in ("0.5:-0.5:3", "-0.5:0.5:0"):
+        said = refused(folder, "export", law, "--to", "csv", f"--velocities={text}")
+        assert "m/s, rising from FROM to TO" in said and "Write for example -0.6:0.8:41." in said, said
     assert "be left out for fmu" in refused(folder, "export", law, "--to", "fmu", "--velocities", "-1:1:3")
     assert "--part must be left out for csv" in refused(folder, "export", law, "--to", "csv", "--part", "controller")
     assert "which has no controller" in refused(folder, "export", law, "--to", "c", "--part", "controller")
@@ -115,6 +118,11 @@ def test_refusals(law: Path) -> None:
             said = refused(folder, "export", law, "--to", "c", *words)
             assert "Option --file must be a new file" in said and mine in said
         (folder / mine).unlink()
+
+
+def test_zero_among_given_velocities_is_zero(law: Path) -> None:
+    jaxdamp("export", law, "--to", "csv", "--velocities=-0.4:0.8:4", "--file", "given.csv")  # once -5.6e-17
+    assert "\n0.0,0.0\n" in (law.parent / "given.csv").read_text()
 
 
 def test_any_name_of_a_law_becomes_a_name_of_c(law: Path) -> None:

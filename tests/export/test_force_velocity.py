@@ -62,7 +62,8 @@ def test_a_bristle_with_a_spring_gives_a_table(tmp_path):
     comments, _, (v, force) = read(to_csv(law, tmp_path / "m.csv", np.linspace(-0.166, 0.166, 601)))
     friction, sliding = 107.225, np.abs(v) > 0.15  # far above the velocity of breaking away
     np.testing.assert_allclose(force[sliding] + 99.2, 1347.49 * v[sliding] + friction * np.sign(v[sliding]), rtol=1e-4)
-    assert len(v) == 601 and len(comments) == 3
+    assert len(v) == 601 and len(comments) == 4
+    assert comments[3] == "# static force of 99.2 N, which pushes the rod out at stroke zero, is in the table"
 
 
 def test_rows_without_a_force_are_left_out_and_said(tmp_path):

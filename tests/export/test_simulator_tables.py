@@ -8,6 +8,7 @@ from jaxdamp.dampers import (
     Bilinear,
     BoucWen,
     FittedRange,
+    GasSpring,
     Heated,
     Lag,
     Linear,
@@ -116,6 +117,37 @@ def test_assetto_corsa_finds_the_knee_and_states_the_misfit(tmp_path):
         to_assetto_corsa(LAW, tmp_path / "front.ini", [-0.1, 0.1, 0.2, 0.3])
     with pytest.raises(ValueError, match="motion_ratio"):
         to_assetto_corsa(LAW, tmp_path / "front.ini", VELOCITIES, motion_ratio=0.0)
+
+
+GAS = GasSpring(20e5, 1e-4, 1.5e-4)
+STATIC = "static force of 284.8 N, which pushes the rod out at stroke zero, is "  # (20e5 - 101325) Pa on 1.5 cm^2
+
+
+def test_the_rates_of_assetto_corsa_are_those_without_the_gas(tmp_path):
+    """Lines through zero once took the gas for damping: 6680 N s/m in place of 984."""
+    laws = {"plain.ini": LAW, "charged.ini": LAW + GAS}
+    plain, charged = (to_assetto_corsa(law, tmp_path / name, VELOCITIES) for name, law in laws.items())
+    assert values(charged) == values(plain)
+    assert STATIC + "left out: it belongs to the spring" in text(charged) and "static force" not in text(plain)
+
+
+@pytest.mark.parametrize("to_table", [to_adams, to_carsim, to_matlab])
+def test_other_tables_keep_the_static_force_and_say_so(tmp_path, to_table):
+    assert STATIC + "in the table" in text(
+        to_table(LAW + GAS, tmp_path / ("front" + ".mat" * (to_table is to_matlab)), VELOCITIES)
+    )
+
+
+def test_assetto_corsa_takes_a_damper_of_one_direction_and_no_spring(tmp_path):
+    one_way = Table(VELOCITIES, np.maximum(2000.0 * VELOCITIES, 0.0))
+    file = to_assetto_corsa(one_way, tmp_path / "front.ini", VELOCITIES)
+    assert values(file)["DAMP_BUMP"] == 0.0 and text(file).count("differ from the table by 0.0 %") == 2
+    for law in (Spring(20_000.0), GAS):
+        with pytest.raises(
+            ValueError, match=r"`law` must have a force that changes with the velocity, but is (Gas)?Sp"
+        ):
+            to_assetto_corsa(law, tmp_path / "none.ini", VELOCITIES)
+    assert not (tmp_path / "none.ini").exists()
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 import dataclasses
 import sys
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 import scipy.signal
@@ -10,7 +11,7 @@ import scipy.signal
 from jaxdamp.bench import SineTest, VirtualDyno
 from jaxdamp.dampers import Besinger, Bilinear, Linear, Saturating
 from jaxdamp.dampers.besinger import least_rebound
-from jaxdamp.identify import fit
+from jaxdamp.identify import fit, fit_targets
 
 
 @pytest.mark.slow
@@ -68,6 +69,34 @@ def test_priors_losses_and_the_machine_count_as_in_a_linear_fit(sines):
         row = drawn[estimate.name]
         assert row.mean == pytest.approx(estimate.value, abs=0.15 * estimate.standard_error)
         assert row.standard_deviation == pytest.approx(estimate.standard_error, rel=0.1)
+
+
+@pytest.mark.slow
+def test_the_posterior_of_targets_is_normal_since_their_tolerances_are_known():
+    pytest.importorskip("numpyro")
+
+    def numbers(law):
+        return {"sum": law.rebound_rate + law.compression_rate, "ratio": law.rebound_rate / law.compression_rate}
+
+    result = fit_targets(numbers, Bilinear(2000.0, 1000.0), {"sum": (3800.0, 50.0), "ratio": (2.2, 0.1)})
+    drawn = result.posterior(samples=800, warm_up=200, seed=1)
+    jacobian = np.array([[1.0, 1.0], [1.0 / 1187.5, -2612.5 / 1187.5**2]]) / np.array([[50.0], [0.1]])
+    errors = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
+    for row, value, error in zip(drawn.parameters, (2612.5, 1187.5), errors, strict=True):
+        assert row.mean == pytest.approx(value, abs=0.15 * error)
+        assert row.standard_deviation == pytest.approx(error, rel=0.12) and row.r_hat < 1.03
+
+
+@pytest.mark.slow
+def test_a_posterior_without_finite_numbers_about_the_fit_is_refused():
+    pytest.importorskip("numpyro")
+
+    def numbers(p):
+        return {"a": jnp.where(jnp.abs(p["x"] - 1.5) < 1e-9, 2.0 * p["x"], jnp.nan)}
+
+    result = fit_targets(numbers, {"x": 1.5}, {"a": (3.0, 0.1)}, starts=1)
+    with pytest.raises(ValueError, match="one without any at the starts of the chains"):
+        result.posterior(samples=10, warm_up=10)
 
 
 @pytest.mark.slow

@@ -45,6 +45,24 @@ def test_a_law_with_memory_is_not_told_to_become_one_without():
     assert "take a law" not in said and "Compare laws" in said
 
 
+@pytest.mark.parametrize(
+    ("law", "remedy"),
+    [
+        (dampers.Bilinear(2000.0, 1500.0), "take a law with a free curve, such as piecewise_linear or table"),
+        (
+            dampers.PiecewiseLinear([0.0], [900.0, 1200.0]),
+            "give the law's curve more points, or take a law with memory",
+        ),
+    ],
+)
+def test_a_curve_that_is_free_already_is_told_to_take_more_points(law, remedy):
+    tests = [bench.SineTest(a, f, cycles=4) for a, f in ((0.02, 1.0), (0.01, 4.0))]
+    truth = dampers.Besinger(1600.0, 4200.0, 900.0, 0.13, 0.05)
+    runs = bench.VirtualDyno(truth, 500.0, force_noise=5.0).run(tests)
+    (said,) = (w for w in identify.fit(law, runs).main_warnings if "law misses the shape" in w)
+    assert remedy in said
+
+
 def test_a_filter_of_a_valve_that_opens_between_samples_is_followed():
     """Once the filter ran in straight lines between samples, and the numbers of the law were up to 0.6 % off."""
     law, tests = dampers.Besinger(1400.0, 5100.0, 810.0, 0.144, 0.044), [bench.SineTest(0.01, 8.0, cycles=10)]

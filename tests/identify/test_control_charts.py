@@ -1,6 +1,6 @@
 """Control charts: average run lengths beside closed forms, published ones and runs of the charts; lines of dampers."""
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -10,6 +10,9 @@ from jaxdamp.bench import SineTest, VirtualDyno
 from jaxdamp.dampers import Bilinear
 from jaxdamp.identify import Cusum, Ewma, Shewhart, control_charts, fit_many
 from jaxdamp.identify.control_charts import AbstractChart, signals
+
+
+NAMES = [str(i + 1) for i in range(30)]
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.4, 1.5])
@@ -99,6 +102,25 @@ def test_a_line_of_fitted_dampers_is_charted_as_it_grows(tmp_path):
     assert "No. 35" in page and "individuals high" in page and "until a signal" in page
 
 
+def test_an_infinite_number_is_a_missing_one_and_the_baseline_any_whole_number():
+    force = np.random.default_rng(3).standard_normal(120)
+    force[80:] -= 2.0
+    missing, infinite = (np.where(np.arange(120) == 60, value, force) for value in (np.nan, np.inf))
+    expected = control_charts({"force": missing}, baseline=50)
+    found = control_charts({"force": infinite}, baseline=cast(int, np.int64(50)))
+    np.testing.assert_array_equal(found.signals["force"], expected.signals["force"])
+    assert found.summary == expected.summary and "force since '8" in found.summary
+    assert found.warnings == expected.warnings and "without some number" in found.warnings[-1]
+    assert not signals(Cusum(), infinite[:80])[65:].any()
+
+
+def test_labels_that_repeat_outside_the_baseline_do_no_harm():
+    force = np.random.default_rng(3).standard_normal(30)
+    found = control_charts({"force": force}, baseline=NAMES[9:19], names=[*NAMES[:28], "3", "4"])
+    np.testing.assert_array_equal(found.baseline, np.arange(9, 19))
+    assert found.centre[0] == pytest.approx(force[9:19].mean())
+
+
 def test_what_cannot_be_charted_is_refused():
     force = np.random.default_rng(0).standard_normal(30)
     cases: list[tuple[Any, Any, dict[str, Any], str]] = [
@@ -106,6 +128,8 @@ def test_what_cannot_be_charted_is_refused():
         ({"a": force, "b": force[1:]}, 10, {}, r"dampers\['b'\]` must be one number for each of 30"),
         ({"a": force}, 3, {}, "`baseline` must be from 8 to 30 dampers"),
         ({"a": force}, ["7", "x"], {}, "`baseline` must be one of"),
+        ({"a": force}, [*NAMES[:10], "9"], {}, "`baseline` must name each damper once, but is '9' repeatedly"),
+        ({"a": force}, NAMES[:10], {"names": [*NAMES[:28], "3", "4"]}, "is '3', of numbers 3, 29. Give labels that"),
         ({"a": force * 0.0}, 10, {}, "8 or more dampers that determine 'a' and are not all alike"),
         ({"a": force}, 10, {"names": ["a"]}, "`names` must be one for each of 30 dampers"),
         ({"a": force}, 10, {"charts": ["EWMA"]}, r"`charts\[0\]` must be a chart"),

@@ -136,6 +136,30 @@ def test_what_is_refused(sines, options: dict[str, Any], message: str):
         fit(Linear(1000.0), sines(Linear(1500.0)), **options)
 
 
+RATE, BOTH, OTHER = ("rebound_rate", (2600.0, 1e-3)), ("*_rate", (2000.0, 5000.0)), ("compression_rate", (1500.0, 10.0))
+
+
+@pytest.mark.parametrize(
+    ("priors", "options", "message"),
+    [
+        ([RATE, BOTH], {}, r"`priors` must give rebound_rate one prior, but is two, of 'rebound_rate' and '\*_rate'"),
+        ([BOTH, RATE], {}, r"`priors` must give rebound_rate one prior, but is two, of '\*_rate' and 'rebound_rate'"),
+        ([OTHER], {"tie": {"compression_rate": "rebound_rate"}}, "tied to rebound_rate. Give the prior of 'rebound_r"),
+        ([OTHER], {"freeze": ["compression_rate"]}, "of compression_rate, which is frozen"),
+        ([OTHER], {"over": ["rebound_rate"]}, "of compression_rate, which is frozen"),
+    ],
+)
+def test_a_prior_is_that_of_one_free_parameter(sines, priors, options: dict[str, Any], message: str):
+    with pytest.raises(ValueError, match=message):
+        fit(Bilinear(2000.0, 2000.0), sines(TRUTH), priors=dict(priors), **options)
+
+
+def test_a_number_of_the_law_is_named_once_beside_a_machine(sines):
+    twice = {"rebound_rate": (2600.0, 1.0), "law.rebound_rate": (2000.0, 1.0)}
+    with pytest.raises(ValueError, match=r"name each number once, but is 'rebound_rate' and 'law.rebound_rate'"):
+        fit(Bilinear(2000.0, 2000.0), sines(TRUTH), priors=twice, rig="offset")
+
+
 @pytest.mark.parametrize("mean", [2250.0, 2300.0])
 def test_a_prior_that_the_records_contradict_does_not_win_by_the_noise_it_makes(sines, mean):
     runs = sines(TRUTH, noise=10.0)

@@ -14,7 +14,7 @@ from jaxdamp import Ride, plots, roads, vehicles
 from jaxdamp.bench import SineTest, VirtualDyno
 from jaxdamp.dampers import Besinger, Bilinear, Linear, Saturating, SeriesSpring, Table
 from jaxdamp.dampers.besinger import least_rebound
-from jaxdamp.identify import FitResult, fit, propagation
+from jaxdamp.identify import FitResult, fit, fit_targets, propagation
 from jaxdamp.rig import Rig
 
 
@@ -174,3 +174,13 @@ def test_a_band_from_the_printed_program_is_that_of_jax(sines, rig):
     band = result.band(velocity)
     width = 2.0 * evidence.quantile * expected.standard_error
     np.testing.assert_allclose(band.upper - band.lower, width, rtol=1e-10)
+
+
+def test_samples_of_a_fit_to_targets_are_normal_since_their_tolerances_are_known():
+    def numbers(law):
+        return {"sum": law.rebound_rate + law.compression_rate, "ratio": law.rebound_rate / law.compression_rate}
+
+    result = fit_targets(numbers, Bilinear(2000.0, 1000.0), {"sum": (3800.0, 50.0), "ratio": (2.2, 0.1)}, starts=1)
+    drawn = result.propagate(lambda law: law.force_velocity(0.5), samples=2000, seed=2)
+    assert float(drawn.standard_error) == pytest.approx(0.5 * 50.584, rel=0.05)  # of (JᵀJ)⁻¹ of the targets
+    assert float(drawn.upper - drawn.lower) == pytest.approx(1.96 * 50.584, rel=0.05)

@@ -94,6 +94,7 @@ def test_fewer_targets_than_numbers_move_what_they_must_and_say_so():
         ({"a": 1.0}, {"a": 0.0}, {}, r"`tolerance of targets\['a'\]` must be positive"),
         ({"a": 1.0}, {"a": 2.0}, {"freeze": ["a"]}, "leave a number to change"),
         ({"a": 1.0}, {"a": 2.0}, {"bounds": {"a": (2.0, 3.0)}}, "`a` must start between 2 and 3"),
+        ({"a": 1.0, "b": 2.0}, {"a": 2.0}, {"freeze": ["b"], "priors": {"b": (1.0, 1.0)}}, "of b, which is frozen"),
         ({"a.b": 1.0}, {"a.b": 2.0}, {}, "names without a point"),
     ],
 )

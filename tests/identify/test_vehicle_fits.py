@@ -210,6 +210,16 @@ def test_what_sensors_add_and_the_fit_leaves_out_is_named_with_its_size():
         assert re.search(text, told), told
 
 
+@pytest.mark.parametrize(("rate", "steps"), [(250.0, 4), (300.0, 4), (500.0, 2), (1000.0, 2)])
+def test_virtual_records_take_steps_of_a_millisecond_or_less(rate, steps):
+    def drive(**how):
+        return identify.virtual_ride(CAR, SWEEP, {"unsprung_acceleration": 0.0}, sampling_rate=rate, **how)
+
+    found, same, exact = (d["unsprung_acceleration"] for d in (drive(), drive(finer=steps), drive(finer=32)))
+    np.testing.assert_array_equal(found, same)
+    assert np.std(found - exact) < 1e-3 * np.std(exact)
+
+
 @pytest.mark.slow
 def test_payload_and_offset_of_each_record_and_its_initial_motion():
     loads, records = (300.0, 360.0), []

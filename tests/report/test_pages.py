@@ -135,7 +135,8 @@ def test_a_page_on_the_whole_chain(comparison: Comparison, rides: dict[str, Resp
     html = page.to_html()
     assert not page.attempts.troubles and "damper_sheet.pdf" not in html
     verdict = html.partition('<div class="verdict">')[2].partition("</div>")[0]
-    for sentence in (found.summary, *comparison.verdict, *ride_verdict(rides), tuned.verdict.sentence, tuned.ending):
+    ridden = [f"a bump: {sentence}" for sentence in ride_verdict(rides)]
+    for sentence in (found.summary, *comparison.verdict, *ridden, tuned.verdict.sentence, tuned.ending):
         assert first_upper(said(sentence)) in verdict
     sections = re.findall(r'<h2 id="part-\d+">(.*?)</h2>', html)
     assert sections == [

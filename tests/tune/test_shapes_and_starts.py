@@ -152,6 +152,6 @@ def test_a_tuned_curve_through_points_drives_no_motion(kind):
     law = kind(velocity, np.array([-950.0, -800.0, -400.0, -30.0, 500.0, 1300.0, 1700.0]))
     car = vehicles.presets.quarter_car_000(law)
     result = tune.minimise("comfort", car, ROAD, fresh_roads=0, max_steps=30, **RUN)
-    forces = np.asarray(result.vehicle.damper.force_points)
+    forces = np.asarray(parameters.get(result.vehicle, "damper.force_points"))
     assert np.all(np.diff(forces) > -1e-2) and forces[3] == pytest.approx(-30.0)
     assert result.after[result.metric] < 0.99 * result.before[result.metric]

@@ -74,6 +74,9 @@ class Limit:
     def __post_init__(self) -> None:
         if self.velocity is not None:
             _checks.positive("velocity", self.velocity, "The direction is in the quantity.")
+        for name, bound in (("minimum", self.minimum), ("maximum", self.maximum)):
+            if bound is not None:
+                _checks.finite(name, bound, "Leave it out where there is no limit.")
         if self.minimum is None and self.maximum is None:
             _checks.refuse("minimum", "be given, or a maximum", None)
         if self.minimum is not None and self.maximum is not None and self.minimum > self.maximum:
