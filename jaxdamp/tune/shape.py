@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple, final
 
 import jax
@@ -135,7 +135,7 @@ class ShapeNumbers(NamedTuple):
     ) -> "ShapeNumbers":
         """Those of the laws of a vehicle that the constraints name; by default, free curves do not fall."""
         if shape is None:
-            shape = _rising(vehicle, free)
+            return cls(tuple(_rising(vehicle, free)))
         shapes = [shape] if isinstance(shape, Shape) else shape
         if not isinstance(shapes, Sequence) or isinstance(shapes, str):
             remedy = "Write `shape=[tune.monotone(), tune.slope(upper=5000.0)]`."
@@ -176,22 +176,18 @@ class ShapeNumbers(NamedTuple):
         return limits
 
 
-def _rising(vehicle: AbstractVehicle, free: FreeParameters) -> list[Shape]:
+def _rising(vehicle: AbstractVehicle, free: FreeParameters) -> Iterator[tuple[Shape, str]]:
     """That the force does not fall between the points of curves whose free numbers have either sign, such as tables.
 
     Without this a search finds curves that drive the motion, which no damper does. Where one falls at the start, it
     does not fall more steeply.
     """
-    shapes = []
-    for path in damper_paths(vehicle):
-        inside = (law for at, law in laws_inside(get(vehicle, path), f"{path}.") if _moves_curve(law, at, free))
-        grids = [points for law in inside if (points := curve_velocities(law)) is not None]
-        if grids:
-            velocities = np.unique(np.concatenate(grids))
+    for at, law in laws_inside(vehicle):
+        velocities = curve_velocities(law) if _moves_curve(law, at, free) else None
+        if velocities is not None:
             places = tuple(f" at {0.5 * (a + b):.2g} m/s" for a, b in itertools.pairwise(velocities))
             span, points = (0.0, math.inf), tuple(map(float, velocities))
-            shapes.append(Shape("slope", "N s/m", span, points, _slopes, places, path, eased=True))
-    return shapes
+            yield Shape("slope", "N s/m", span, points, _slopes, places, eased=True), at.removesuffix(".")
 
 
 def _moves_curve(law: AbstractDamper, path: str, free: FreeParameters) -> bool:
