@@ -116,13 +116,16 @@ def _percent(share: float) -> str:
 
 
 def _of_the_law(named: Sequence[_Named], left: float, memoryless: bool) -> str:
-    """A sentence on what the law misses; a law with memory is not told to become one without."""
+    """A sentence on what the law misses; a law with memory is not told to take another curve without."""
     parts = [found.words.format("is") for found in named if found.effect.name not in OF_LAW]
     alike = f" (of the squared residual {', '.join(parts)})" * bool(parts)
     if named and named[-1].effect.name in OF_LAW:
         effect = named[-1].effect
-        remedy = f": {effect.remedy}" * memoryless
-        return f"By the residual, the law misses {effect.words(named[-1].sizes)}{alike}{remedy}. {LAST_WORD}"
+        misses = f"By the residual, the law misses {effect.words(named[-1].sizes)}{alike}"
+        if memoryless:
+            return f"{misses}: {effect.remedy}. {LAST_WORD}"
+        of_memory = effect.remedy if effect.name == "hysteresis" else ""
+        return f"{misses}: {of_memory}." if of_memory else f"{misses}. {LAST_WORD}"
     return (
         f"The residual repeats from cycle to cycle, and no effect of the test machine explains"
         f" {_percent(min(left, 1.0))} % of that{alike}: the law misses something of the damper. {LAST_WORD}"
@@ -157,7 +160,7 @@ def _search(
     numbers, named = span.shape[1], list[_Named]()
     while len(named) < MOST_EFFECTS:
         late = {found.effect.name: float(found.sizes[0]) for found in named if found.effect.name in LATE}
-        found = _clearest([*effects, hysteresis(records, late)], span, residual, records, squares, numbers)
+        found = _clearest([*effects, hysteresis(problem, records, late)], span, residual, records, squares, numbers)
         if found is None or found.share < least:
             break
         if not named and _is_static(found):

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp.dampers import PiecewiseLinear, SplineTable, Table, laws_inside
+from jaxdamp.identify.model import is_memoryless
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.traces import signals
@@ -189,11 +190,13 @@ def _curve(problem: Problem, records: Sequence[Record]) -> Pattern:
     return Pattern("curve", np.concatenate(parts, axis=1), True, lambda sizes: words, remedy, at_rest)
 
 
-def hysteresis(records: Sequence[Record], late: dict[str, float]) -> Pattern:
+def hysteresis(problem: Problem, records: Sequence[Record], late: dict[str, float]) -> Pattern:
     """A force that is late by another time in each record and direction, which is memory of a damper.
 
-    `late` are delay and lag of the force [s] that were found before.
+    A law with a lag imitates a delay of a channel, and leaves such times too. `late` are delay and lag of the force [s]
+    that were found before.
     """
+    imitates = not (is_memoryless(problem.law) or any(name.endswith("force_delay") for name in problem.free.names))
     values = np.zeros((sum(record.at.size for record in records), 2 * len(records)))
     for k, (_, at, weight, motion, _) in enumerate(records):
         force = motion.force + sum(LATE[name](motion, size) for name, size in late.items())
@@ -201,12 +204,14 @@ def hysteresis(records: Sequence[Record], late: dict[str, float]) -> Pattern:
         values[at, 2 * k], values[at, 2 * k + 1] = rate * (force > 0), rate * (force <= 0)
 
     def words(sizes: np.ndarray) -> str:
-        ends = _late_or_early(1e3 * (sizes + sum(late.values())))
-        return (
-            f"memory of the damper, whose force is {ends} over records and directions and so by no delay of a channel"
-        )
+        ends = f"{_late_or_early(1e3 * (sizes + sum(late.values())))} over records and directions"
+        if imitates:
+            return f"memory of the damper, or a delay of a channel: the force is {ends}, beside the memory of the law"
+        return f"memory of the damper, whose force is {ends} and so by no delay of a channel"
 
     remedy = "take a law with memory, such as besinger_series_spring, besinger_lag or series_spring_dahl"
+    if not is_memoryless(problem.law):
+        remedy = 'compare with a law without memory beside a "delay" of the machine (`rig`)' * imitates
     return Pattern("hysteresis", values, True, words, remedy)
 
 

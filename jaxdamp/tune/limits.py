@@ -172,6 +172,12 @@ class LimitEnd(NamedTuple):
     scale: float
 
 
+def end_moved(limit: Limit, end: LimitEnd, to: float) -> str:
+    """A limit with another end, in words."""
+    sign = "≤" if end.sign > 0 else "≥"
+    return f"{limit.name} {sign} {amount(to, limit.unit)} instead of {amount(end.value, limit.unit)}"
+
+
 def limit_ends(limits: Iterable[Limit]) -> list[LimitEnd]:
     """The finite ends of all limits."""
     ends = [

@@ -18,7 +18,7 @@ from jaxdamp.solve import Evaluation
 from jaxdamp.tune.combinations import Combinations, beside_next
 from jaxdamp.tune.combining import Driven, every_combination, rank
 from jaxdamp.tune.descending import Descent, Ended, missed, reached
-from jaxdamp.tune.limits import Limit, LimitEnd, LimitRange, amount, decided, in_each, limit_ends, lost_limits
+from jaxdamp.tune.limits import Limit, LimitEnd, LimitRange, decided, end_moved, in_each, limit_ends, lost_limits
 from jaxdamp.tune.measuring import ride_on
 from jaxdamp.tune.objective import Function, check_objective
 from jaxdamp.tune.ranges import start_points
@@ -38,6 +38,7 @@ from jaxdamp.tune.verdict import (
     tightened_notes,
     true_value_notes,
     violations,
+    where_it_holds,
     without_effect,
     workshop_notes,
 )
@@ -46,6 +47,7 @@ from jaxdamp.vehicles import AbstractVehicle
 
 OUTWARDS = 1e-3  # of what the search reached, by which a relaxed limit is beyond it
 SHARE = 0.01  # of the metric: the gain for which a relaxation is said
+FAR = 0.1  # of a limit, up to which its price at the optimum is taken to hold
 FEWEST = 4  # fresh roads before their interval is looked at; then twice as many, and so on
 TIGHTENED = 2  # times that a search is repeated with limits that did not hold on fresh roads
 
@@ -247,7 +249,7 @@ def _result(
         violated=violations(short, after),
         extrapolated=tuple(extrapolated),
         allowed=task.allowed,
-        elsewhere=_where(task, asked["fresh_roads"]),
+        elsewhere=where_it_holds(white=is_white(task.road), fresh_roads=asked["fresh_roads"]),
         relaxation=_relaxation(task, ended, limits),
         tightened=tightened,
     )
@@ -295,28 +297,19 @@ def _in_scenarios(
     return ScenarioValues(measured.scenario_names, *sides), [measured.reported(side) for side in sides]
 
 
-def _where(task: DesignTask[AbstractVehicle], fresh_roads: int) -> str:
-    """Where the numbers of a tuning hold that was not tried on fresh roads, in words."""
-    if is_white(task.road):
-        return "in the mean of all such roads"
-    return "on the road of the tuning" + (", which cannot be drawn again" if fresh_roads else ", tried on no other")
-
-
 def _relaxation(task: DesignTask[V], ended: Ended, limits: tuple[Sequence[Limit], Sequence[Limit]]) -> str:
     """Which limit, relaxed by how much, would give a tuning within the limits, or one that is 1 % better, in words.
 
     Where limits are not met: as far as the search came. At an optimum f within the limits, the Lagrange multiplier λ of
     a limit that holds it is its price −df/d(limit), and it must be relaxed by about 0.01 |f|/λ: said is the limit for
-    which this is the smallest share of its scale. All places or scenarios of one limit are relaxed alike.
+    which this is the smallest share of its scale, if it is near. All places or scenarios are relaxed alike.
     """
     ends, of = limit_ends(limits[0]), {limit.name: limit for limit in limits[0]}
     rows = ended.evaluation.rows
     over = [(row - end.sign * end.value) / end.scale for end, row in zip(ends, rows[1:], strict=True)]
     worst = {of[ends[i].name].of: i for i in np.argsort(over) if over[i] > task.tolerance.limit}
     if worst:
-        reached = [(ends[i], ends[i].sign * rows[1 + i]) for i in worst.values()]
-        moved = [_moved(of[end.name], end, to + end.sign * OUTWARDS * abs(to)) for end, to in reached]
-        return f"Within reach: {' and '.join(moved)}."
+        return _within_reach([(of[ends[i].name], ends[i], float(rows[1 + i])) for i in worst.values()])
     prices: dict[tuple[str, float], list[tuple[float, int]]] = {}
     for i, price in _prices(task, ended, limit_ends(limits[1])).items():
         limit, end = of[ends[i].name], ends[i]
@@ -327,24 +320,28 @@ def _relaxation(task: DesignTask[V], ended: Ended, limits: tuple[Sequence[Limit]
         return ""
     dearest = max(totals, key=totals.__getitem__)
     end = ends[max(prices[dearest])[1]]
-    to = end.value + end.sign * end.scale * SHARE * abs(float(rows[0])) / totals[dearest]
+    by = end.scale * SHARE * abs(float(rows[0])) / totals[dearest]
+    if by > FAR * abs(end.value):  # where there may be no such optimum
+        return ""
+    to = end.value + end.sign * by
     alike = ", and all others of this limit alike" * (len({e.name for e in ends if of[e.name].of == dearest[0]}) > 1)
-    return f"Cheapest for 1 % less {task.objective.name}: {_moved(of[end.name], end, to)}{alike}."
+    return f"Cheapest for 1 % less {task.objective.name}: {end_moved(of[end.name], end, to)}{alike}."
+
+
+def _within_reach(reached: Sequence[tuple[Limit, LimitEnd, float]]) -> str:
+    """The limits as far as the search came, by the rows that it reached."""
+    ends = [(limit, end, end.sign * row) for limit, end, row in reached]
+    moved = [end_moved(limit, end, to + end.sign * OUTWARDS * abs(to)) for limit, end, to in ends]
+    return f"Within reach: {' and '.join(moved)}."
 
 
 def _prices(task: DesignTask[V], ended: Ended, ends: Sequence[LimitEnd]) -> dict[int, float]:
     """−df/d(limit) of each end of a limit that holds an optimum, by its number."""
     _, rows, slopes = ended.evaluation
     least, free = task.tolerance.limit, np.array([not side for side in task.space.side(ended.values)])
-    free &= ~task.space.is_choice
+    free &= ~(task.space.is_choice | task.space.is_held)
     tight = [i for i, end in enumerate(ends) if abs(rows[1 + i] - end.sign * end.value) < least * end.scale]
     if not (tight and free.any() and ended.slope_left() < task.tolerance.slope):
         return {}
     multipliers = -np.linalg.lstsq(slopes[1:][tight][:, free].T, slopes[0, free], rcond=None)[0]
     return {i: float(price) for i, price in zip(tight, multipliers, strict=True) if price > 0.0}
-
-
-def _moved(limit: Limit, end: LimitEnd, to: float) -> str:
-    """A limit with another end, in words."""
-    sign = "≤" if end.sign > 0 else "≥"
-    return f"{limit.name} {sign} {amount(to, limit.unit)} instead of {amount(end.value, limit.unit)}"

@@ -23,6 +23,7 @@ from jaxdamp.vehicles import AbstractVehicle
 Curve = Float[Array, " points"]
 HOLD = 1000  # steps of 1 ms at constant velocity, after which the states of a law count as settled
 POINTS = 24  # slopes along a curve
+INSIDE = 1e-3  # of the margin of a condition at the start, which is left
 
 
 @final
@@ -125,17 +126,19 @@ def _mean_bend(v: Curve, f: Curve) -> Array:
 
 @final
 class ShapeNumbers(NamedTuple):
-    """The numbers that shape constraints limit, as a function of the vehicle."""
+    """The numbers that shape constraints and conditions of laws limit, as a function of the vehicle."""
 
     pairs: tuple[tuple[Shape, str], ...]  # each constraint with the path of a law
+    conditions: tuple[tuple[str, str, int], ...] = ()  # name, path of a law, and number of its condition
 
     @classmethod
     def of(
         cls, vehicle: AbstractVehicle, shape: Sequence[Shape] | Shape | None, free: FreeParameters
     ) -> "ShapeNumbers":
         """Those of the laws of a vehicle that the constraints name; by default, free curves do not fall."""
+        conditions = tuple(_conditions(vehicle, free))
         if shape is None:
-            return cls(tuple(_rising(vehicle, free)))
+            return cls(tuple(_rising(vehicle, free)), conditions)
         shapes = [shape] if isinstance(shape, Shape) else shape
         if not isinstance(shapes, Sequence) or isinstance(shapes, str):
             remedy = "Write `shape=[tune.monotone(), tune.slope(upper=5000.0)]`."
@@ -147,7 +150,7 @@ class ShapeNumbers(NamedTuple):
             if not chosen:
                 _checks.refuse("shape", f"name a damper of the vehicle ({', '.join(paths)})", repr(one.dampers))
             pairs += [(one, path) for path in chosen]
-        return cls(tuple(pairs))
+        return cls(tuple(pairs), conditions)
 
     def __call__(self, vehicle: AbstractVehicle) -> dict[str, Scalar]:
         """The numbers by name."""
@@ -156,16 +159,24 @@ class ShapeNumbers(NamedTuple):
             velocities = jnp.asarray(shape.velocities)
             numbers = shape.numbers(velocities, held_force(get(vehicle, path), velocities))
             numbers_by_name |= dict(zip(_names(shape, path), numbers, strict=True))
+        for name, path, number in self.conditions:
+            law = get(vehicle, path)
+            condition = law.conditions()[number]
+            numbers_by_name[name] = getattr(law, condition.parameter) - condition.least
         return numbers_by_name
 
     @property
     def names(self) -> list[str]:
         """The names of the numbers."""
-        return [name for shape, path in self.pairs for name in _names(shape, path)]
+        own = [name for shape, path in self.pairs for name in _names(shape, path)]
+        return own + [name for name, *_ in self.conditions]
 
     def limits(self, start: Mapping[str, float]) -> list[Limit]:
         """The limits of the numbers; their distances are scaled by the largest number of the curve at the start."""
         limits = []
+        for name, *_ in self.conditions:
+            least = INSIDE * start[name]
+            limits.append(Limit(name, name, least, math.inf, scaled(least, math.inf, start[name]), is_shape=True))
         for shape, path in self.pairs:
             names = _names(shape, path)
             size = scaled(*shape.span, max(abs(start[name]) for name in names))
@@ -174,6 +185,14 @@ class ShapeNumbers(NamedTuple):
                 span = (min(lower, start[name]), max(upper, start[name])) if shape.eased else shape.span
                 limits.append(Limit(name, of, *span, size, shape.unit, is_shape=True))
         return limits
+
+
+def _conditions(vehicle: AbstractVehicle, free: FreeParameters) -> Iterator[tuple[str, str, int]]:
+    """The conditions between parameters of laws of which some are free; no constructor takes a law beyond them."""
+    for at, law in laws_inside(vehicle):
+        if any(p.path.startswith(at) for p in free.chosen):
+            for number, condition in enumerate(law.conditions()):
+                yield f"{at}{condition.parameter} beyond {condition.formula}", at.removesuffix("."), number
 
 
 def _rising(vehicle: AbstractVehicle, free: FreeParameters) -> Iterator[tuple[Shape, str]]:

@@ -32,6 +32,16 @@ def test_a_spring_in_series_is_no_filter_beside_a_mass():
     assert cause == "the law" and not any('add "' in text for text in said.texts), said.texts
 
 
+def test_a_delay_that_the_lag_of_a_law_imitates_is_not_denied():
+    """The fit that is advised, without memory beside a delay, is the true one; the delay was called impossible."""
+    tests = [bench.SineTest(0.025, f, cycles=5) for f in (0.2, 0.5, 1.0, 2.0, 4.0)]
+    dyno = bench.VirtualDyno(dampers.Bilinear(3000.0, 1200.0), 500.0, force_noise=5.0, force_delay=0.005, seed=1)
+    runs = dyno.run(tests)
+    lagging = identify.fit(dampers.Lag(dampers.Bilinear(2000.0, 2000.0), 0.004), runs)
+    assert any("or a delay of a channel" in w and "without memory beside a" in w for w in lagging.warnings)
+    assert identify.fit(dampers.Bilinear(2000.0, 2000.0), runs, rig="delay").rmse < lagging.rmse
+
+
 def test_a_law_with_memory_is_not_told_to_become_one_without():
     """Its residual has the shape of a curve; a table without hysteresis was proposed, worse on measured records."""
     tests = [bench.SineTest(a, f, cycles=8) for a, f in ((0.02, 1.0), (0.01, 4.0))]

@@ -156,3 +156,12 @@ def test_a_tuned_curve_through_points_drives_no_motion(inside):
     forces = np.asarray(parameters.get(result.vehicle.damper, "law.force_points" if inside else "force_points"))
     assert np.all(np.diff(forces) > -1e-2) and forces[3] == pytest.approx(-30.0)
     assert result.after[result.metric] < 0.99 * result.before[result.metric]
+
+
+def test_a_tuned_law_keeps_the_conditions_between_its_parameters():
+    """The force of Besinger must not fall as the velocity grows: no constructor takes a law of which it does."""
+    law = dampers.Besinger(4200.0, 1200.0, 900.0, limit_velocity=0.1445, transition_velocity=0.05)
+    car = vehicles.presets.quarter_car_000(law)
+    result = tune.minimise("comfort", car, ROAD, over=["damper.rebound_rate"], bounds={"*": None}, fresh_roads=0, **RUN)
+    assert dampers.keeps_conditions(result.vehicle)
+    assert any("rate beyond" in words for words in result.active), result.active

@@ -288,6 +288,8 @@ def test_the_cheapest_relaxation_gives_one_percent():
     again = tune.minimise("working_space_rms", soft, WHITE, limits={TYRE: moved_limit(result)})
     assert again.after["working_space_rms"] / result.after["working_space_rms"] == pytest.approx(0.99, abs=1e-3)
     assert tune.minimise(COMFORT, CAR, WHITE, limits={TYRE: "+90%"}).relaxation == ""
+    nearly = tune.minimise(TYRE, CAR, WHITE, limits={"working_space_rms": 0.01097})  # 0.010997 without it
+    assert nearly.active_limits and nearly.relaxation == ""  # no relaxation gives one percent
 
 
 def test_of_limits_that_are_not_met_those_within_reach_are_said():
