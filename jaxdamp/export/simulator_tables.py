@@ -97,7 +97,10 @@ def settled_table(law: AbstractDamper, velocities: VectorLike, call: str, *, tur
         comments.append(f"rows left out{', with rebound counted positive' * turned}: {curve.note}")
     settled, force = velocity[curve.settled], np.asarray(curve.force)[curve.settled]
     comments += _range_lines(law, settled, turned=turned)
-    static = float(law.force(rest, rest, law.initial_state()))
+    if 0.0 in settled:  # nothing is compiled for it
+        static = float(force[settled == 0.0][0])
+    else:
+        static = float(law.force(rest, rest, law.initial_state()))
     static *= abs(static) > 1e-9 * np.abs(force).max(initial=0.0)  # less is a rounding error
     return SettledTable(settled, force, static, comments, curve.note)
 

@@ -95,6 +95,7 @@ OTHERS = {
     "weighting_state_space",
     "discrete_weighting",
     "third_octave_rms",
+    "lift_off_below",
 }
 COUNTS = {"lift_off_fraction", "working_space_exceedance"}
 DIFFERENTIABLE = [name for name in METRICS if name not in COUNTS]
