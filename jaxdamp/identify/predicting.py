@@ -236,6 +236,7 @@ def error_shares(
     passes every velocity twice, once above and once below mid-stroke. The mean of a bin is the error that another curve
     over velocity could remove (*shape*), the difference of the two halves from it is *hysteresis* (or a dependence on
     the stroke), and the scatter about them is the *rest*. The contribution of the scatter to the means is subtracted.
+    Points of a force-velocity table stand alone: their error is all rest.
 
     `FitResult.error_shares` gives the shares of a fit over its own records.
 
@@ -255,7 +256,8 @@ def error_shares(
     laws, forces = predict_by_record(law, runs, initial_state)
     for own, run, force in zip(laws, runs, forces, strict=True):
         part = used_samples(own, run, is_memoryless(own), initial_state)
-        sums += _sums(run.velocity[part], run.stroke[part], force[part] - run.force[part])
+        error = force[part] - run.force[part]
+        sums += [0.0, 0.0, error @ error] if run.of_points else _sums(run.velocity[part], run.stroke[part], error)
     shape, hysteresis, rest = sums / max(sums.sum(), np.finfo(float).tiny)
     return ErrorShares(float(shape), float(hysteresis), float(rest))
 

@@ -137,7 +137,8 @@ def cannot_choose(errors: Mapping[str, Sequence[float]], best: str, numbers: Map
 def verdict(choice: Recommendation[Rung], rungs: Sequence[Rung], held_out: Sequence[BenchRun]) -> tuple[str, ...]:
     """Sentences on the recommended law, why it is this one, and the shares of the errors of the laws."""
     best = choice.rung
-    static = [rung for rung in rungs if is_memoryless(rung.result.law)]
+    moved = not all(run.of_points for run in best.result.runs)  # a table has no hysteresis to be followed
+    static = [rung for rung in rungs if moved and is_memoryless(rung.result.law)]
     sentences = [_error_of(best, rungs, held_out), *why(choice, rungs, made=best.reduced)]
     if static:
         rung = best if is_memoryless(best.result.law) else recommendation(static).rung

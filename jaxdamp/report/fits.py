@@ -104,7 +104,7 @@ def fit_report(
     report, runs, preflight = Report(**part(page, PAGE)), page["runs"], page["preflight"]
     baseline = page["baseline"]
     best, *others = fit_verdict(report, comparison, baseline)
-    report.verdict(best, f"{preflight.summary}." if preflight else "", more=others)
+    report.verdict(best, f"{preflight.summary}." if preflight and preflight.records else "", more=others)
     records = (*comparison.best.result.runs, *comparison.held_out) if runs is None else tuple(runs)
     if not all(run.of_points for run in records):  # a table has no cycles to show
         report.sheet(lambda: comparison.plot("sheet", baseline=baseline), comparison.verdict[0], "damper_sheet")

@@ -72,7 +72,7 @@ def minimise(
     Every parameter has bounds, so that the result stays near a damper that can be built. The default bounds are:
 
     - numbers of one sign (rates, stiffnesses, forces, velocities, exponents, knots): one third to three times the
-      start; forces of tables and splines count from that at zero velocity, which is held;
+      start; forces of tables and splines count from that at zero velocity, and a point there is held;
     - numbers of either sign (coefficients, offsets): −1 to 3 times the start;
     - zeros and weights of networks: their domain.
 

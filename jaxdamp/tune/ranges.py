@@ -285,7 +285,7 @@ def _default(p: Parameter, value: float, static: float | None) -> Pair:
     One third to three times the start for numbers of one sign (rates, forces, velocities, exponents, knots); the same
     distance below the start as above it for numbers of either sign (coefficients, offsets); no bound but the domain if
     the start is zero or has no meaning, as for the weights of a network, and for commands between levels. Forces of a
-    curve count from that at zero velocity, which no valve changes and which is held.
+    curve count from that at zero velocity, so that a point there, which no valve changes, is held.
     """
     if static is not None:
         ends = static + (value - static) / FACTOR, static + FACTOR * (value - static)

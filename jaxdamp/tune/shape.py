@@ -162,7 +162,7 @@ class ShapeNumbers(NamedTuple):
         for name, path, number in self.conditions:
             law = get(vehicle, path)
             condition = law.conditions()[number]
-            numbers_by_name[name] = getattr(law, condition.parameter) - condition.least
+            numbers_by_name[name] = jnp.min(getattr(law, condition.parameter) - condition.least)
         return numbers_by_name
 
     @property

@@ -12,7 +12,7 @@ from jaxdamp.metrics import Metric
 from jaxdamp.solve import Evaluation
 from jaxdamp.tune.limits import Limit, LimitRange, amount, excess, in_each, lost_limits
 from jaxdamp.tune.objective import Objective
-from jaxdamp.tune.ranges import FACTOR, Change, SearchRange
+from jaxdamp.tune.ranges import Change, SearchRange
 from jaxdamp.tune.smooth import exact_counterpart
 from jaxdamp.vehicles import AbstractVehicle, ChannelKind
 
@@ -205,7 +205,7 @@ def bound_notes(space: SearchRange, changes: tuple[Change, ...]) -> list[str]:
             ends = [f"{len(group)} parameters ended at their bounds: {of}"]
         widen = f"`bounds={{{group[0].name.partition('[')[0]!r}: (lower, upper)}}`"
         reason = {
-            "default": f"by default 1/{FACTOR:g} of the start or {FACTOR:g} times it; other bounds: {widen}",
+            "default": f"by default, in proportion to the start; other bounds: {widen}",
             "given": "as given",
             "domain": f"the end of the values {'they' if len(group) > 1 else 'it'} may take",
         }[origin]

@@ -178,6 +178,8 @@ def test_a_fit_to_a_table_knows_its_points_and_no_more(tmp_path):
     assert ladder.best.name == "linear" and "each quarter of the points" in ladder.verdict[0]
     held_out = {rung.name: rung.error for rung in ladder.rungs}
     assert held_out["polynomial"] > held_out["linear"] > np.sqrt(np.mean(left**2))
+    assert not any("hysteresis" in sentence for sentence in ladder.verdict)
+    assert identify.error_shares(result.law, runs) == (0.0, 0.0, 1.0)
     assert not bench.preflight(runs).findings  # nothing is wrong with a motion that there was not
 
 
