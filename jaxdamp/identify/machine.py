@@ -141,7 +141,7 @@ def started_on(law: Start, runs: Sequence[BenchRun], rig: Machine, named: Iterab
     machine = started_machine(rig, runs)
     bare, trained = without_machine(machine, runs), isinstance(law, AbstractTrainedStart)
     begin = law.untrained(bare) if isinstance(law, AbstractTrainedStart) else started(law, bare)
-    if machine is not None and not isinstance(rig, Rig) and begin.traits().contains_offset:
+    if machine is not None and holds_static_force(rig) and begin.traits().contains_offset:
         constants = constant_forces(begin)
         stated = any(matching(constants or (), name.removeprefix("law.")) for name in named)
         if isinstance(law, AbstractDamper):

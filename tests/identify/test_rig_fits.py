@@ -172,6 +172,14 @@ def test_every_law_is_without_the_static_force_that_the_machine_has():
     assert named.rig is None and named["preload"].value == pytest.approx(-90.0, abs=15.0)
 
 
+@pytest.mark.parametrize("effect", ["delay", "mass", "friction", "gas_stiffness"])
+def test_a_machine_without_a_static_force_leaves_it_to_the_law(effect):
+    law = Bilinear(2600.0, 1200.0) + Spring(1000.0, -90.0)
+    runs = records(law, Rig(), tests=[SineTest(0.01, 1.0, cycles=3), SineTest(0.005, 6.0)], rate=250.0)
+    beside = identify.fit(Bilinear(2000.0, 1000.0) + Spring(900.0), runs, rig=effect, starts=1)
+    assert beside["preload"].value == pytest.approx(-90.0, abs=5.0) and beside.rmse < 6.0
+
+
 def test_names_of_effects_get_their_starts_from_the_records():
     rig = Rig(gas_force=-120.0, force_delay=2e-3)
     result = identify.fit(Bilinear, records(rig=rig), rig=["gas", "delay"])
