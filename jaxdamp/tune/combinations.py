@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from jaxdamp._tables import Column, Contents, Table, plain
+from jaxdamp.tune.limits import percentage
 from jaxdamp.tune.rescoring import Rescore
 from jaxdamp.tune.verdict import relative_change
 
@@ -62,10 +63,9 @@ def beside_next(combinations: Combinations, metric: str, fresh: Rescore | None) 
     if fresh is None:
         values = combinations.metrics[metric]
         change = relative_change(values[1], values[0])
-        words = "" if change is None else f"{change:+.1f} %"
+        words = "" if change is None else percentage(change)
     else:
         half, mean = 100.0 * fresh.half_width(metric), 100.0 * float(np.mean(fresh.change(metric)))
-        error = f" ± {half:.1f}" if np.isfinite(half) else ""
         unsure = "" if mean < -half else ", so that roads do not tell them apart"
-        words = f"{mean:+.1f}{error} % on {fresh.roads} fresh roads{unsure}"
+        words = f"{percentage(mean, half)} on {fresh.roads} fresh roads{unsure}"
     return f"beside the next, {combinations.at(1)}: {words}"

@@ -15,6 +15,7 @@ from jaxdamp._tables import Column, Contents, Table, plain, typeset_unit, with_u
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import MetricValues
 from jaxdamp.parameters import FreeParameters
+from jaxdamp.tune.limits import percentage
 from jaxdamp.tune.measuring import Measurement
 from jaxdamp.tune.result import V
 from jaxdamp.tune.scenario_ride import smooth_in_scenarios
@@ -178,7 +179,7 @@ class ParetoFront(AbstractResult, Generic[V]):
             return f"No design within the limits; the nearest one: {' '.join(self.warnings[:1])} {'; '.join(ends)}."
         knee = ", ".join(f"{name} {self.values[name][self.knee]:.4g}" for name in self.names)
         changes = [relative_change(self.before[n], float(self.values[n][self.knee])) for n in self.names]
-        from_start = ["from 0" if change is None else f"{change:+.1f} %" for change in changes]
+        from_start = ["from 0" if change is None else percentage(change) for change in changes]
         return (
             f"{len(self)} points, {'; '.join(ends)}. Knee at point {self.knee}: {knee} "
             f"({', '.join(from_start)} from the start). {self.evaluations} designs simulated with derivatives."

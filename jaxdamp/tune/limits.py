@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 EXAMPLE = "Write `{'working_space_peak_to_peak': 0.1}`, or `{...: (smallest, largest)}`."
 ENDS = "Write 0.1, or (-0.08, 0.1); None for an end without a limit, '+10%' for one relative to the start."
+MANY_DIGITS = 1e5  # percent, from which a change has two digits
 WITHIN = 0.01  # relative excess over a limit on fresh roads up to which it counts as met
 PERCENT = re.compile(r"([+-]\d+(?:\.\d*)?) *%")
 End: TypeAlias = float | int | str | None  # of a limit: in its unit, or relative to the start; None for none
@@ -74,6 +75,17 @@ class Limit(NamedTuple):
 def amount(value: float, unit: str) -> str:
     """A value with its unit, such as "0.1 m"."""
     return f"{value:.4g} {typeset_unit(unit)}".rstrip()
+
+
+def percentage(change: float, half_width: float = math.nan) -> str:
+    """A change [%] in words, with half the width of its interval [%] if it has one.
+
+    >>> percentage(-15.61, 0.62), percentage(3.4e9)
+    ('-15.6 ± 0.6 %', '+3.4e+09 %')
+    """
+    spec = ".1f" if abs(change) < MANY_DIGITS else ".2g"
+    error = f" ± {half_width:{spec}}" if math.isfinite(half_width) else ""
+    return f"{change:+{spec}}{error} %"
 
 
 def in_scenarios(name: str, scenarios: Sequence[str]) -> list[str]:

@@ -18,7 +18,7 @@ from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride, simulate
-from jaxdamp.tune.limits import amount, half_interval, in_scenarios
+from jaxdamp.tune.limits import amount, half_interval, in_scenarios, percentage
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.scenario_ride import exact
 from jaxdamp.tune.scenarios import Road, Scenarios
@@ -140,9 +140,8 @@ class Rescore(AbstractResult):
         if self.metric not in self.in_percent:
             return f"{head}, from {before.mean():.4g} to {amount(after.mean(), self.units[self.metric])} on average."
         change = 100 * self.change(self.metric)
-        error = f" ± {100 * self.half_width(self.metric):.1f}" if self.roads > 1 else ""
-        ends = f"{change.min():+.0f} to {change.max():+.0f} %"
-        return f"{head}; it changes by {change.mean():+.1f}{error} % on average ({ends})."
+        mean = percentage(change.mean(), 100 * self.half_width(self.metric))
+        return f"{head}; it changes by {mean} on average ({round(change.min()):+.6g} to {round(change.max()):+.6g} %)."
 
     @property
     def in_percent(self) -> list[str]:

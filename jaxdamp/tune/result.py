@@ -15,7 +15,7 @@ from jaxdamp._status import Status
 from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, typeset_unit, with_unit
 from jaxdamp._types import Figure
 from jaxdamp.tune.combinations import Combinations
-from jaxdamp.tune.limits import LimitRange, written
+from jaxdamp.tune.limits import LimitRange, percentage, written
 from jaxdamp.tune.objective import Objective, Targets
 from jaxdamp.tune.ranges import Change
 from jaxdamp.tune.rescoring import Rescore, Spectrum, spectra
@@ -159,7 +159,7 @@ class TuneResult(AbstractResult, Generic[V]):
         """The change on the road of the tuning, bounds and limits with their price, and extreme scenarios, in words."""
         before, after, unit = self.before[self.metric], self.after[self.metric], self.units[self.metric]
         change = change_in_percent(self, self.metric, before, after)
-        share = "" if change is None else f" ({change:+.1f} %)"
+        share = "" if change is None else f" ({percentage(change)})"
         stops = [f"{name} {at_limit(self, name)}" for name in self.active_limits]
         at_bounds = [f"{change.name} {change.note}" for change in self.parameters if change.note]
         inside = "" if at_bounds else "all parameters inside their bounds"

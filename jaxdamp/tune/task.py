@@ -45,7 +45,7 @@ def step_notes(start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable
         try:
             needed = ride_of(tuned).substeps
         except ValueError as error:
-            return [f"The tuned vehicle does not bear the step. {error}"]
+            return [f"The tuned vehicle is not simulated like the start: {error}"]
     notes = [str(warning.message) for warning in caught]
     if needed > taken:
         notes.append(

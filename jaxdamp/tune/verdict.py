@@ -10,7 +10,7 @@ import numpy as np
 from jaxdamp._status import Status
 from jaxdamp.metrics import Metric
 from jaxdamp.solve import Evaluation
-from jaxdamp.tune.limits import Limit, LimitRange, amount, excess, in_each, lost_limits
+from jaxdamp.tune.limits import Limit, LimitRange, amount, excess, in_each, lost_limits, percentage
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.ranges import Change, SearchRange
 from jaxdamp.tune.smooth import exact_counterpart
@@ -93,11 +93,11 @@ def verdict_of(result: "TuneResult[AbstractVehicle]") -> Verdict:
         missed = "; ".join(result.violated.values())
         return Verdict(Outcome.LIMIT_NOT_MET, f"Limit not met: {missed}. {words}.")
     price, name = _price(result)
-    cost = f"; price: {name} {price:+.1f} %" if name else "; nothing else gets worse"
+    cost = f"; price: {name} {percentage(price)}" if name else "; nothing else gets worse"
     held = _limits_in_words(result)
     error = 0.0 if result.fresh is None else 100.0 * result.fresh.half_width(result.metric)
     over = lost_limits(result.fresh, _allowed(result))
-    lost = [f"{name} is {100 * x:.1f} % beyond its limit" for name, x in over.items()]
+    lost = [f"{name} is {percentage(100 * x)[1:]} beyond its limit" for name, x in over.items()]
     if lost:
         outcome, first, held = Outcome.LIMIT_LOST, f"Not better: {'; '.join(lost)}; {words}", ""
     elif gain - error > -NOTICED and (result.fresh is None or gain > 0.0):
@@ -126,13 +126,12 @@ def _change(result: "TuneResult[AbstractVehicle]") -> tuple[float, str]:
     if fresh is None or not np.all(np.isfinite(fresh.change(name))):
         here = change_in_percent(result, name, result.before[name], result.after[name])
         change = 100.0 * (result.after[name] - result.before[name]) if here is None else here
-        share = _from_to(result, name, result.before[name], result.after[name]) if here is None else f"{here:+.1f} %"
+        share = _from_to(result, name, result.before[name], result.after[name]) if here is None else percentage(here)
         return change, f"{name} {share} {result.elsewhere or 'on the road of the tuning'}"
     mean, half = 100.0 * float(np.mean(fresh.change(name))), 100.0 * fresh.half_width(name)
-    error = f" ± {half:.1f}" if np.isfinite(half) else ""
     roads = f"{fresh.roads} fresh roads" if fresh.roads > 1 else "1 fresh road, which gives no interval"
     sides = float(fresh.before[name].mean()), float(fresh.after[name].mean())
-    share = _from_to(result, name, *sides) if signed else f"{mean:+.1f}{error} %"
+    share = _from_to(result, name, *sides) if signed else percentage(mean, half)
     return mean, f"{name} {share} on {roads}"
 
 
@@ -175,7 +174,7 @@ def _limits_in_words(result: "TuneResult[AbstractVehicle]") -> str:
     texts = []
     for name in result.limits:
         after, change = result.after[name], mean_change(result, name)
-        share = amount(after, result.units[name]) if change is None else f"{change:+.1f} %"
+        share = amount(after, result.units[name]) if change is None else percentage(change)
         text = f"{name} {share}{', ' * (name in result.active_limits)}{at_limit(result, name)}"
         if (fresh := result.fresh) is not None and name in result.allowed:
             over = [excess(fresh, one, span) for one, span in _allowed(result, name).items()]

@@ -321,7 +321,7 @@ def test_a_tuned_vehicle_that_the_step_does_not_suit_is_noted():
     ]
     assert notes[0] == []
     assert "need 9 steps between two instants, and the search took 1" in notes[1][0]
-    assert "does not bear the step" in notes[2][0]
+    assert "is not simulated like the start" in notes[2][0]
     (coarse,) = step_notes(start, start, lambda car: ride_of(car, 0.02))
     assert "coarse" in coarse
 

@@ -45,6 +45,7 @@ CASES = [
     (([0.95, 0.96, 0.97], [1.05] * 3, [1.29, 1.3, 1.31]), Outcome.TRADE, f"price: {TRAVEL} +30.0 %"),
     (([0.80, 0.99, 1.15], [1.05] * 3, [1.0] * 3), Outcome.NOT_SHOWN, "Not shown to be better"),
     (([1.04, 1.05, 1.06], [1.05] * 3, [1.0] * 3), Outcome.NOT_BETTER, "Not better"),
+    (([1e7, 1.01e7, 1.02e7], [1.05] * 3, [1.0] * 3), Outcome.NOT_BETTER, f"Not better: {COMFORT} +1e+09 ± 2.5e+07 %"),
     (([0.89, 0.90, 0.91], [1.14, 1.15, 1.16], [1.0] * 3), Outcome.LIMIT_LOST, f"{TYRE} is 4.5 % beyond its limit"),
 ]
 
@@ -63,7 +64,9 @@ def test_every_fresh_road_beyond_a_limit_is_counted():
     assert "at its limit, beyond it on 3 of 5 fresh roads" in result.verdict.sentence
 
 
-@pytest.mark.parametrize(("metrics", "outcome", "words"), CASES, ids=[case[1].name for case in CASES])
+@pytest.mark.parametrize(
+    ("metrics", "outcome", "words"), CASES, ids=[f"{case[1].name}-{case[0][0][0]:g}" for case in CASES]
+)
 def test_the_verdict_is_that_of_the_fresh_roads(metrics, outcome, words):
     result = made_up(*metrics)
     assert result.verdict.outcome is outcome and words in result.verdict.sentence
