@@ -24,6 +24,11 @@ MOST = 64
 HEUN = 1.0  # largest rate of a state times the step for the explicit step of slow states, which is stable up to 2
 _VELOCITIES = np.concatenate([-np.geomspace(3.0, 1e-4, 14), [0.0], np.geomspace(1e-4, 3.0, 14)])  # m/s
 _STROKES = np.array([-0.05, 0.0, 0.05])  # m
+# Strokes at which damping is looked for [m], such as that of a stop; at those in pairs far away only if it has settled
+# there: a polynomial of the stroke, fitted to some centimetres, grows without limit beyond them.
+_CONTACTS = np.array([0.0, *(side * x for side in (-1.0, 1.0) for x in (0.005, 0.01, 0.02, 0.035, 0.05, 0.2, 0.3))])
+_FAR = np.abs(_CONTACTS) > 0.1
+_SETTLED = 0.01  # largest relative difference of the damping within a pair
 
 
 class Need(NamedTuple):
@@ -33,16 +38,20 @@ class Need(NamedTuple):
         substeps: steps between two instants.
         by_travel: the largest share of a velocity's error that comes back in one undivided step through the travel,
             as from a spring; laws of the velocity alone, such as friction, are accurate even where they are divided.
+        by_contact: the largest share that comes back through damping that begins along the stroke, as in a stop: the
+            step before it knows nothing of it.
     """
 
     substeps: int
     by_travel: float
+    by_contact: float
 
 
 class Slopes(NamedTuple):
     """The largest slopes of a law."""
 
     damping: float = 0.0  # of the force by the velocity at the end of a step [N s/m]
+    contact: float = 0.0  # by how much of it is beyond that at stroke zero [N s/m]
     stiffness: float = 0.0  # of the force by the travel within a step, through the stroke and the states [N/m]
     at_rest: float = 0.0  # of the force by the stroke at rest [N/m], the states held
     rate: float = 0.0  # of states that an explicit step carries on [1/s]
@@ -51,8 +60,9 @@ class Slopes(NamedTuple):
 class _Samples(NamedTuple):
     """Slopes of a law at many velocities and strokes, as `Slopes` takes the largest of them; arrays."""
 
-    over_step: Array | np.ndarray | None = None  # where states are extrapolated, [N s/m]
-    damping: Array | np.ndarray | None = None  # at an instant, [N s/m]
+    damping: (
+        Array | np.ndarray
+    )  # at strokes and velocities: at an instant, or over a step where states are extrapolated [N s/m]
     by_velocity: Array | np.ndarray | None = None  # through the states, [N/m]
     by_stroke: Array | np.ndarray | None = None  # [N/m]
     rates: Array | np.ndarray | None = None  # of the states, where an explicit step carries them on, [1/s]
@@ -62,12 +72,13 @@ class _Samples(NamedTuple):
         rate = 0.0
         if self.rates is not None:
             rate = float(np.max(np.abs(np.linalg.eigvals(np.nan_to_num(self.rates)))))
-        if self.over_step is not None:
-            return Slopes(2.0 * _largest(self.over_step), rate=rate)
-        assert self.damping is not None and self.by_velocity is not None and self.by_stroke is not None
+        damping = _largest_along_strokes(self.damping)
+        contact = damping - _largest(self.damping[0])
+        if self.by_velocity is None or self.by_stroke is None:  # the states are extrapolated
+            return Slopes(2.0 * damping, 2.0 * contact, rate=rate)
         at_rest = float(np.nan_to_num(self.by_stroke[_STROKES.size // 2]))
         by_travel = _largest(self.by_velocity) + _largest(np.abs(self.by_stroke))
-        return Slopes(_largest(self.damping), by_travel, at_rest, rate)
+        return Slopes(damping, contact, by_travel, at_rest, rate)
 
 
 class KnownCar(NamedTuple):
@@ -161,9 +172,9 @@ def step_need(system: System, slopes: Sequence[Slopes], dt: float, *, most: int 
     """
     mass, ports = np.asarray(system.form.mass), np.asarray(system.form.ports)
     if not any(any(s) for s in slopes):
-        return Need(1, 0.0)
+        return Need(1, 0.0, 0.0)
     felt = np.diag(ports @ np.linalg.solve(mass, ports.T))
-    by_rate = 0.5 * dt * np.array([s.damping for s in slopes]) * felt
+    by_rate, by_contact = (0.5 * dt * np.array(of) * felt for of in zip(*(s[:2] for s in slopes), strict=True))
     by_travel = 0.25 * dt * dt * np.array([s.stiffness for s in slopes]) * felt
     # the least n with by_rate/n + by_travel/n² <= LARGEST
     counts = 0.5 * (by_rate + np.sqrt(by_rate * by_rate + 4.0 * LARGEST * by_travel)) / LARGEST
@@ -171,7 +182,7 @@ def step_need(system: System, slopes: Sequence[Slopes], dt: float, *, most: int 
     count, worst = max(1, math.ceil(min(float(counts.max()), 1e9))), int(counts.argmax())
     if count > most:
         _refuse_law(system.layout.ports[worst], slopes[worst], dt, count)
-    return Need(count, float(by_travel.max()))
+    return Need(count, float(by_travel.max()), float(by_contact.max()))
 
 
 def _refuse_law(name: str, slopes: Slopes, dt: float, count: int) -> None:
@@ -211,10 +222,21 @@ def _at_largest_ratio(law: AbstractDamper) -> AbstractDamper:
 
 def _of_term(law: AbstractDamper, dt: float) -> _Samples:
     velocity, size, traits = jnp.asarray(_VELOCITIES, float), law.initial_state().size, law.traits()
+    contact = jnp.asarray(_CONTACTS if traits.stroke_dependent else _CONTACTS[:1], float)
     rates = _slopes_of_rates(law, velocity) if size and traits.has_explicit_step else None
     if size and traits.extrapolable_states:
-        return _Samples(_slopes_over_step(law, velocity, jnp.asarray(dt, dtype=float)), rates=rates)
-    return _Samples(None, *_slopes_at_instant(law, velocity, jnp.asarray(_STROKES, float)), rates)
+        return _Samples(_slopes_over_step(law, velocity, contact, jnp.asarray(dt, dtype=float)), rates=rates)
+    return _Samples(*_slopes_at_instant(law, velocity, contact, jnp.asarray(_STROKES, float)), rates)
+
+
+def _largest_along_strokes(damping: Array | np.ndarray) -> float:
+    """The largest damping at any velocity: at strokes near the middle, and at those far away where it has settled."""
+    at_strokes = np.max(np.nan_to_num(np.asarray(damping)), axis=1, initial=0.0)
+    if at_strokes.size == 1:
+        return float(at_strokes[0])
+    inner, outer = at_strokes[_FAR].reshape(-1, 2).T
+    settled = np.abs(outer - inner) <= _SETTLED * inner
+    return float(max(at_strokes[~_FAR].max(), outer[settled].max(initial=0.0)))
 
 
 def _largest(values: Array | np.ndarray) -> float:
@@ -223,33 +245,38 @@ def _largest(values: Array | np.ndarray) -> float:
 
 @compiled_quickly
 def _slopes_over_step(
-    law: AbstractDamper, velocity: Float[Array, " velocities"], dt: Scalar
-) -> Float[Array, " velocities"]:
+    law: AbstractDamper, velocity: Float[Array, " velocities"], contact: Float[Array, " contacts"], dt: Scalar
+) -> Float[Array, "contacts velocities"]:
     """Slope of the force after a step by the velocity at its end [N s/m], of a law whose states are extrapolated."""
 
-    def force(end: Scalar, v: Scalar) -> Scalar:
-        still = jnp.zeros_like(v)
-        return law.force(still, end, law.advance(still, v, still, end, law.initial_state(), dt))
+    def force(end: Scalar, v: Scalar, x: Scalar) -> Scalar:
+        return law.force(x, end, law.advance(x, v, x, end, law.initial_state(), dt))
 
-    return jax.vmap(jax.grad(force))(velocity, velocity)
+    return jax.vmap(lambda x: jax.vmap(jax.grad(force), (0, 0, None))(velocity, velocity, x))(contact)
 
 
 @compiled_quickly
 def _slopes_at_instant(
-    law: AbstractDamper, velocity: Float[Array, " velocities"], stroke: Float[Array, " strokes"]
+    law: AbstractDamper,
+    velocity: Float[Array, " velocities"],
+    contact: Float[Array, " contacts"],
+    stroke: Float[Array, " strokes"],
 ) -> tuple[Array, Array, Array]:
-    """∂F/∂v [N s/m] and Σ ∂F/∂s ∂ṡ/∂v [N/m] at velocities, and ∂F/∂x [N/m] at strokes, with the states of rest."""
+    """∂F/∂v [N s/m] at strokes and velocities, Σ ∂F/∂s ∂ṡ/∂v [N/m] at velocities, ∂F/∂x [N/m] at strokes, from rest."""
     start, zero = law.initial_state(), jnp.zeros_like(velocity[0])
 
-    def at(v: Scalar) -> tuple[Scalar, Scalar]:
-        damping = jax.jvp(lambda v: law.force(zero, v, start), (v,), (jnp.ones_like(v),))[1]
+    def damping(x: Scalar, v: Scalar) -> Scalar:
+        return jax.jvp(lambda v: law.force(x, v, start), (v,), (jnp.ones_like(v),))[1]
+
+    def by_states(v: Scalar) -> Scalar:
         if not start.size:
-            return damping, jnp.zeros_like(damping)
+            return jnp.zeros_like(v)
         change = jax.jvp(lambda v: law.state_rate(zero, v, start), (v,), (jnp.ones_like(v),))[1]
-        return damping, jax.jvp(lambda s: law.force(zero, v, s), (start,), (change,))[1]
+        return jax.jvp(lambda s: law.force(zero, v, s), (start,), (change,))[1]
 
     by_stroke = jax.vmap(lambda x: jax.jvp(lambda x: law.force(x, zero, start), (x,), (jnp.ones_like(x),))[1])(stroke)
-    return *jax.vmap(at)(velocity), by_stroke
+    of_contacts = jax.vmap(lambda x: jax.vmap(lambda v: damping(x, v))(velocity))(contact)
+    return of_contacts, jax.vmap(by_states)(velocity), by_stroke
 
 
 @compiled_quickly

@@ -23,6 +23,7 @@ ENOUGH_PER_PERIOD = 30.0  # from here on the error of a car on a road is below a
 USUAL = 1e-3  # s between instants, which resolve a road for cars and trucks
 FOLLOWS = 0.1  # share of the road's height that a mode takes at rest, from which on the road must resolve it
 STEEP = 0.25  # share of a velocity's error that comes back through the travel, from which on the error is estimated
+CONTACT = 0.05  # share that comes back through damping that begins along the stroke, from which on likewise
 SAMPLES_PER_PERIOD = 3.0  # of a record of the road; the tyre of a real wheel smooths what lies between them
 SAMPLES = 32  # in a run, from which on a road of samples is taken for a record, and not for a few straight pieces
 WARNED, REFUSED = 0.01, 0.2  # estimated RMS of the error over the RMS of a channel
@@ -75,9 +76,9 @@ class RunCheck(NamedTuple):
         - the instants must give at least 5 points a period of the fastest mode that follows the road (wheel hop), or
           the run is refused: the road is straight between instants, whatever steps the engine takes;
         - the step is divided as the steepest law needs, up to 64 times, or the run is refused (`step_need`);
-        - with fewer than 30 points a period, or a law that is steep for the step, the error is estimated by a
-          comparison with half the step on a stretch of the run (`step_error`): above 1 % a warning states it, above
-          20 % the run is refused.
+        - with fewer than 30 points a period, a law that is steep for the step, or a stop with much damping, the error
+          is estimated by a comparison with half the step on a stretch of the run (`step_error`): above 1 % a warning
+          states it, above 20 % the run is refused.
 
         Beside that a record of the road with fewer than 3 samples a period of that mode is warned of.
 
@@ -93,9 +94,9 @@ class RunCheck(NamedTuple):
         needs = [step_need(*car, self.dt, most=MOST if wanted is None else np.inf) for car in cars]
         most = max(needs, key=lambda need: need.substeps)
         count = most.substeps if wanted is None else _allowed(wanted, most, self.dt)
-        by_travel = [need.by_travel for need in needs]
         suspects = {int(np.argmin(per_period))} if min(per_period) < ENOUGH_PER_PERIOD else set()
-        suspects |= {int(np.argmax(by_travel))} if max(by_travel) > STEEP else set()
+        for shares, most_of_it in (([n.by_travel for n in needs], STEEP), ([n.by_contact for n in needs], CONTACT)):
+            suspects |= {int(np.argmax(shares))} if max(shares) > most_of_it else set()
         suspects |= {needs.index(most)} if count < most.substeps else set()
         self._judge_errors(suspects, len(cars), count)
         return count

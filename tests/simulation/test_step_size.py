@@ -137,6 +137,38 @@ def test_a_law_that_is_a_stiff_spring_over_the_step_divides_it(law, counts):
     assert [substeps_needed(car, dt) for dt in (1e-3, 2e-3, 5e-3, 1e-2, 2e-2)] == counts
 
 
+ALONG = dampers.StrokeDependent((dampers.Linear(3e5), dampers.Linear(1500.0)), [-0.03, 0.004])
+
+
+@pytest.mark.parametrize(
+    ("law", "count"),
+    [
+        (dampers.Linear(3e5), 3),
+        (dampers.Linear(900.0) + dampers.BumpStop(0.08, 60e3, 2e8, 3e5, end="rebound"), 3),
+        (ALONG, 3),
+        (dampers.Heated(ALONG, 3e-3, 600.0), 3),
+        (dampers.Lag(ALONG, 1e-4), 5),
+        (
+            dampers.StrokeScaled(dampers.Linear(1500.0), -2.0, 300.0),
+            1,
+        ),  # e^27 times as steep at 0.3 m, if one got there
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_damping_that_begins_along_the_stroke_divides_the_step(law, count):
+    assert substeps_needed(quarter_car_000(law), 1e-3) == count
+
+
+def test_a_stop_that_a_wheel_hits_hard_is_a_warning():
+    law = dampers.Besinger(900.0, 2800.0, 700.0, 0.25, 0.05)
+    light = replace(quarter_car_000(law + dampers.BumpStop(0.01, 60e3, 2e8, 6e4, end="both")), {"unsprung_mass": 15.0})
+    kerb = roads.cosine_bump(0.06, start=0.1, duration=0.1)
+    with pytest.warns(CoarseStepWarning, match="coarse for this vehicle on this road: the error of"):
+        found = simulate(light, kerb, duration=0.5)["damper_force"]
+    fine = simulate(light, kerb, duration=0.5, substeps=64)["damper_force"]
+    assert np.abs(found - fine).max() < 0.1 * np.abs(fine).max()  # as large as the force itself in undivided steps
+
+
 def test_an_explicit_law_of_a_user_divides_a_step_that_it_cannot_follow():
     assert substeps_needed(quarter_car_000(OwnLag(1500.0, 0.004)), 1e-3) == 1
     assert substeps_needed(quarter_car_000(OwnLag(1500.0, 0.0001)), 1e-3) == 10
