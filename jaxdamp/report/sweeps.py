@@ -140,8 +140,8 @@ def _smallest(
     values = data[name].where(allowed)
     place = values.isel(values.argmin(...)).coords
     where = _where(data, axes, place)
-    change = None if baseline is None else percent_change(float(baseline[name]), float(values.min()))
-    if baseline is not None and change is not None:
+    if baseline is not None and (before := float(baseline[name])) > 0.0:  # of others a share says nothing
+        change = percent_change(before, float(values.min()))
         where += f", {change:+.1f} % from the baseline ({_in_words(data, name, baseline[name])})"
     ends = {axis: {float(data[axis].min()), float(data[axis].max())} for axis in axes if data.sizes.get(axis, 0) > 2}
     at_end = [path_words(axis) for axis, both in ends.items() if float(place[axis]) in both]

@@ -120,7 +120,7 @@ def tolerance_effects(
     effects = []
     for i, parameter in enumerate(result.parameters):
         s = by_path[paths[i]]
-        first = result.gradient[name][i] * result.point[i] * s / value
-        second = result.hessian[name][i, i] * (result.point[i] * s) ** 2 / value
+        first = result.gradient[name][i] * result.point[i] * s / abs(value)
+        second = result.hessian[name][i, i] * (result.point[i] * s) ** 2 / abs(value)
         effects.append(ToleranceEffect(parameter, s, 0.5 * second, float(np.hypot(first, second / np.sqrt(2.0)))))
     return tuple(sorted(effects, key=lambda effect: -effect.deviation))

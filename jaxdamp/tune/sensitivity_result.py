@@ -49,9 +49,9 @@ class Sensitivity(AbstractResult):
     hessian: dict[str, Float[np.ndarray, "numbers numbers"]] | None = None
 
     def elasticities(self, metric: str) -> dict[str, float]:
-        """Change of a metric in percent for each percent of a number; NaN for a number, or a metric, that is zero."""
+        """Change of a metric in percent of its size for each percent of a number; NaN where one of both is zero."""
         _checks.one_of("metric", metric, self.values)
-        scaled = self.gradient[metric] * self.point / (self.values[metric] or np.nan)
+        scaled = self.gradient[metric] * self.point / (abs(self.values[metric]) or np.nan)
         return dict(zip(self.parameters, np.where(self.point == 0.0, np.nan, scaled).tolist(), strict=True))
 
     @property
@@ -105,9 +105,9 @@ class Sensitivity(AbstractResult):
         return Table(f"Change of the metrics for {FORCE_STEP:g} N at each velocity of {damper}", columns, tuple(rows))
 
     def curve_effects(self, damper: str) -> dict[str, Float[np.ndarray, " points"]]:
-        """Change of each metric in percent for 100 N at each velocity of a damper."""
+        """Change of each metric in percent of its size for 100 N at each velocity of a damper."""
         gradients = self.curves[damper].gradient
-        return {name: 100.0 * FORCE_STEP * g / (self.values[name] or np.nan) for name, g in gradients.items()}
+        return {name: 100.0 * FORCE_STEP * g / (abs(self.values[name]) or np.nan) for name, g in gradients.items()}
 
     def flatness(self, metric: str) -> tuple[str, ...]:
         """How far each principal direction of the parameters can go for 1 % of the metric, in sentences.
@@ -123,8 +123,8 @@ class Sensitivity(AbstractResult):
         _checks.one_of("metric", metric, self.hessian)
         chosen = np.flatnonzero(self.point != 0.0)
         scale = self.point[chosen]
-        relative = self.hessian[metric][np.ix_(chosen, chosen)] * np.outer(scale, scale) / self.values[metric]
-        slope = self.gradient[metric][chosen] * scale / self.values[metric]
+        relative = self.hessian[metric][np.ix_(chosen, chosen)] * np.outer(scale, scale) / abs(self.values[metric])
+        slope = self.gradient[metric][chosen] * scale / abs(self.values[metric])
         curvature, directions = np.linalg.eigh(relative)
         sentences = []
         if np.linalg.norm(slope) > COST:

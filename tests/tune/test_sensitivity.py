@@ -91,6 +91,32 @@ def test_second_derivatives_say_how_flat_an_optimum_is() -> None:
     assert "has a slope here, 0.28 % for 1 %" in aside.flatness(METRICS[0])[0]
 
 
+def test_a_negative_value_rises_and_falls_as_a_positive_one() -> None:
+    """A metric less a constant has its derivatives, and its minimum."""
+
+    def below(values: dict[str, Any]) -> Any:
+        return values[METRICS[0]] - 3.0
+
+    found = tune.sensitivity(below, LINEAR, WHITE, over=["rate"], metrics=METRICS[:1], second_order=True)
+    plain = tune.sensitivity(METRICS[0], LINEAR, WHITE, over=["rate"], second_order=True)
+    share = plain.values[METRICS[0]] / abs(found.values["below"])
+    assert found.values["below"] < 0.0
+    assert found.elasticities("below")["damper.rate"] == pytest.approx(
+        share * plain.elasticities(METRICS[0])["damper.rate"]
+    )
+    best = tune.sensitivity(
+        below,
+        vehicles.presets.quarter_car_000(dampers.Linear(BEST)),
+        WHITE,
+        over=["rate"],
+        metrics=METRICS[:1],
+        second_order=True,
+    )
+    assert best.flatness("below")[0].startswith("below rises by 1 % at ±")
+    (effect,) = tune.tolerance_effects(below, LINEAR, WHITE, {"damper.rate": 0.05}, metrics=METRICS[:1])
+    assert effect.mean > 0.0 and "costs" in effect.sentence("below")
+
+
 @pytest.mark.slow
 def test_the_value_in_the_worst_scenario_is_the_true_one() -> None:
     """A smooth maximum of two equal numbers, of which derivatives are, would be 0.7 % larger."""
