@@ -119,8 +119,22 @@ def limit_spans(
     for name, allowed in limit_ranges(limits, known).items():
         if any(allowed.relative) and (start is None or name not in start):
             _checks.refuse(f"limits[{name!r}]", "be a number here, where there is no start", "relative to one", ENDS)
-        spans[name] = allowed.at(math.nan if start is None else float(start.get(name, math.nan)))
+        spans[name] = span_from(name, allowed, math.nan if start is None else float(start.get(name, math.nan)))
     return spans
+
+
+def span_from(name: str, allowed: LimitRange, start: float) -> Span:
+    """Smallest and largest allowed value of a metric that starts at this value.
+
+    Raises:
+        ValueError: no value lies between them, since one of them is relative to the start.
+    """
+    lower, upper = allowed.at(start)
+    if lower >= upper:
+        must = f"leave values between its ends, where {name} starts at {start:.4g}"
+        remedy = "One end is relative to the start: write both as numbers, or both relative."
+        _checks.refuse(f"limits[{name!r}]", must, f"{lower:.4g} to {upper:.4g}", remedy)
+    return lower, upper
 
 
 def limit_ranges(limits: Limits | None, known: Sequence[str]) -> dict[str, LimitRange]:

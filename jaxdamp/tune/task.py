@@ -24,7 +24,7 @@ from jaxdamp.simulation import (
     stationary_notes,
 )
 from jaxdamp.solve import Evaluation, Region
-from jaxdamp.tune.limits import Limit, LimitRange, limit_ends, limit_ranges, scaled
+from jaxdamp.tune.limits import Limit, LimitRange, limit_ends, limit_ranges, scaled, span_from
 from jaxdamp.tune.measuring import BatchProgram, Computed, Measurement
 from jaxdamp.tune.objective import Function, Targets, goal_limits, goal_objective, objective_of
 from jaxdamp.tune.ranges import search_range, start_points
@@ -162,7 +162,7 @@ class DesignTask(Generic[V]):
         of_metrics = []
         for name, allowed in self.allowed.items():
             for entry in self.measured.entries(name):
-                span = allowed.at(before[entry])
+                span = span_from(entry, allowed, before[entry])
                 of_metrics.append(Limit(entry, name, *span, scaled(*span, before[entry]), self.units[name]))
         return of_metrics + self.measured.curves.limits(before)
 

@@ -152,6 +152,10 @@ WRONG_SCENARIOS = [
         "must not move an axle in scenarios",
     ),
     (lambda: tune.minimise(ACCELERATION, LINEAR, WHITE["C"], limits={TYRE: (2.0, 1.0)}), "in increasing order"),
+    (
+        lambda: tune.minimise(ACCELERATION, LINEAR, WHITE["C"], limits={TYRE: (1e6, "-5%")}),
+        "1e.06 to .* is relative to",
+    ),
     (lambda: tune.minimise(ACCELERATION, LINEAR, WHITE["C"], starts=0), "`starts` must be 1 or more"),
     (lambda: tune.minimise(ACCELERATION, LINEAR, WHITE["C"], fresh_roads=-1), "`fresh_roads` must be 0 or more"),
     (

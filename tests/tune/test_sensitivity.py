@@ -1,6 +1,7 @@
 """Sensitivities against differences and closed forms, the cost of tolerances, and robust tunings."""
 
 import json
+from collections.abc import Mapping
 from typing import Any
 
 import jax
@@ -94,7 +95,7 @@ def test_second_derivatives_say_how_flat_an_optimum_is() -> None:
 def test_a_negative_value_rises_and_falls_as_a_positive_one() -> None:
     """A metric less a constant has its derivatives, and its minimum."""
 
-    def below(values: dict[str, Any]) -> Any:
+    def below(values: Mapping[str, jax.Array]) -> jax.Array:
         return values[METRICS[0]] - 3.0
 
     found = tune.sensitivity(below, LINEAR, WHITE, over=["rate"], metrics=METRICS[:1], second_order=True)
