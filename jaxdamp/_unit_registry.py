@@ -17,13 +17,16 @@ def unit_registry() -> "pint.UnitRegistry":
 
 
 def ratio(written: str, other: str) -> float | None:
-    """How many of another unit one of this unit is, or None if they measure different things or are none.
+    """How many of another unit one of this unit is; None if there is no such number.
 
-    >>> ratio("mile", "m"), ratio("kg", "m")
-    (1609.344, None)
+    That is so of units of different things, of what is no unit, and of scales with different zeros.
+
+    >>> ratio("mile", "m"), ratio("kg", "m"), ratio("degC", "K")
+    (1609.344, None, None)
     """
     registry = unit_registry()  # not within `try`: that it does not start says nothing of the text
     try:
-        return float(registry.Quantity(1.0, written.strip()).to(other.strip()).magnitude)
+        zero, one = (float(registry.Quantity(x, written.strip()).to(other.strip()).magnitude) for x in (0.0, 1.0))
     except Exception:  # pint answers unknown text with errors of many classes, its tokeniser's among them
         return None
+    return one if zero == 0.0 else None
