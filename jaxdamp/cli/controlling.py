@@ -61,9 +61,11 @@ class Controlling:
             for name, value in times.items():
                 _checks.refuse(name, "be given with --controller, whose it is", value, "Or leave it out.")
             return car
-        if law is not None and not takes_command(law):
-            remedy = "The law that jaxdamp fit makes of records at several commands does."
-            _checks.refuse("law", "take a command, which --controller sets", type(law).__name__, remedy)
+        laws = car.elements() if law is None else (law,)
+        if not any(map(takes_command, laws)):
+            remedy = "Give the vehicle a law that does: jaxdamp fit makes one of records at several commands."
+            must, named = "be left out, as no damper takes a command", ", ".join(type(one).__name__ for one in laws)
+            _checks.refuse("controller", must, f"{self.controller} for {named}", remedy)
         policy = parse_policy(self.controller, car)
         return control.Controlled(car, policy, **times)
 

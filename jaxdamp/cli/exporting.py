@@ -46,10 +46,13 @@ class OneFile:
     def checked(self, name: str, beside: Sequence[str] = ()) -> Path:
         """The file to write, by this name if none or a folder is given; or a refusal.
 
-        Neither it nor a file `beside` it with these endings may exist, unless it is to be replaced.
+        It has the ending of this name. Neither it nor a file `beside` it with these endings may exist, unless it is to be
+        replaced.
         """
         file = Path(name) if self.file is None else self.file
-        whole = file / name if file.is_dir() else file
+        whole, own = file / name if file.is_dir() else file, Path(name).suffix
+        if whole.suffix.lower() != own:
+            _checks.refuse("file", f"be a folder or a file NAME{own}", whole, f"Try {whole.stem}{own}.")
         for each in (whole, *(whole.with_name(f"{whole.stem}{ending}") for ending in beside)):
             if each.exists() and not self.replace:
                 _checks.refuse("file", "be a new file", each, "Give another name, or --replace.")

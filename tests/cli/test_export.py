@@ -120,6 +120,16 @@ def test_refusals(law: Path) -> None:
         (folder / mine).unlink()
 
 
+@pytest.mark.parametrize(("to", "other"), [("adams", "a.csv"), ("csv", "b.mat"), ("carsim", "c.dpr"), ("fmu", "d")])
+def test_a_file_with_the_ending_of_another_format_is_refused(law: Path, to: str, other: str) -> None:
+    ending = (PROGRAMS | TABLES)[to][0]
+    said = refused(law.parent, "export", law, "--to", to, "--file", other)
+    assert (
+        f"Option --file must be a folder or a file NAME{ending}, but is {other}" in said
+        and f"Try {other[0]}{ending}." in said
+    )
+
+
 def test_zero_among_given_velocities_is_zero(law: Path) -> None:
     jaxdamp("export", law, "--to", "csv", "--velocities=-0.4:0.8:4", "--file", "given.csv")  # once -5.6e-17
     assert "\n0.0,0.0\n" in (law.parent / "given.csv").read_text()
