@@ -64,8 +64,8 @@ class Controlling:
         laws = car.elements() if law is None else (law,)
         if not any(map(takes_command, laws)):
             remedy = "Give the vehicle a law that does: jaxdamp fit makes one of records at several commands."
-            must, named = "be left out, as no damper takes a command", ", ".join(type(one).__name__ for one in laws)
-            _checks.refuse("controller", must, f"{self.controller} for {named}", remedy)
+            must, named = "set the command of a damper that takes one", ", ".join(type(one).__name__ for one in laws)
+            _checks.refuse("controller", must, f"{self.controller} beside {named}", remedy)
         policy = parse_policy(self.controller, car)
         return control.Controlled(car, policy, **times)
 

@@ -82,7 +82,7 @@ def test_the_numbers_of_a_controller_are_tuned_and_written_for_a_ride(tmp_path: 
     message = refused(tmp_path, "tune", tmp_path / "car.json", "iso:C", "--controller", "modal-skyhook:gain=1")
     assert "must be one of 'heave', 'pitch', 'roll'" in message
     plain = refused(tmp_path, "tune", "quarter_car_000", "iso:C", "--controller", "skyhook")
-    assert "be left out, as no damper takes a command, but is skyhook for Linear" in plain
+    assert "set the command of a damper that takes one, but is skyhook beside Linear" in plain
 
 
 @pytest.mark.slow
