@@ -46,8 +46,8 @@ class OneFile:
     def checked(self, name: str, beside: Sequence[str] = ()) -> Path:
         """The file to write, by this name if none or a folder is given; or a refusal.
 
-        It has the ending of this name. Neither it nor a file `beside` it with these endings may exist, unless it is to be
-        replaced.
+        It has the ending of the name. Neither it nor a file `beside` it with these endings may exist, unless it is to
+        be replaced.
         """
         file = Path(name) if self.file is None else self.file
         whole, own = file / name if file.is_dir() else file, Path(name).suffix

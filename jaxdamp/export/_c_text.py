@@ -10,11 +10,12 @@ from jaxtyping import PyTree
 
 from jaxdamp import _checks
 from jaxdamp.codegen import C, PrintedFunction, Program
+from jaxdamp.dampers import AbstractDamper, laws_inside
 from jaxdamp.export._controlled_program import ControlledProgram
 from jaxdamp.export._controller_program import ControllerProgram, Line
 from jaxdamp.export._law_program import LawNumber, LawProgram, identifier
 from jaxdamp.export._vehicle_program import VehicleProgram
-from jaxdamp.vehicles import Channel
+from jaxdamp.vehicles import AbstractVehicle, Channel
 
 
 LANGUAGE = C()
@@ -169,6 +170,12 @@ def _member(number: LawNumber, real: str) -> Iterable[str]:
     yield f"{real} {number.name}{size};"
 
 
+def _fitted(model: AbstractDamper | AbstractVehicle) -> list[str]:
+    """The ranges of the records that laws were fitted to."""
+    laws = [(path.removesuffix("."), law.fitted_to) for path, law in laws_inside(model)]
+    return [f"{path or 'The law'} was fitted to: {span.words()}." for path, span in laws if span is not None]
+
+
 DERIVATIVES = ("force", "advance", "state_rate")  # functions whose derivatives can be written
 
 
@@ -197,6 +204,7 @@ def law_source(program: LawProgram, name: str, derivatives: Sequence[str] = ()) 
         "",
         "SI units. Stroke x [m] and velocity v [m/s] are positive in extension (rebound), force [N] is positive",
         f"when it resists extension. `state` holds {states} numbers, set by {name}_init.",
+        *_fitted(program.law),
     ]
     return CSource(name, about, program.dtype, program.numbers, [(states, program.states, "")], functions)
 
@@ -215,6 +223,7 @@ def vehicle_source(program: VehicleProgram, name: str, derivatives: bool = False
         f"The first {upper}_STATES numbers of c are the states x: {', '.join(name for name, _ in program.states)}.",
         f"y holds {upper}_OUTPUTS channels.",
         f"Steps longer than {upper}_LONGEST_STEP are too long for laws as steep as these: `simulate` divides them.",
+        *_fitted(program.vehicle),
     ]
     if isinstance(program, ControlledProgram):
         about += _about_instants(program, f"{name}_step", "Behind them c holds where the controller is.")

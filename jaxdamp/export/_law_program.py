@@ -60,9 +60,10 @@ def law_numbers(law: eqx.Module) -> list[LawNumber]:
     return numbers
 
 
-def _conditions(law: AbstractDamper) -> list[tuple[AbstractDamper, Any]]:
-    """Every condition between parameters, with the law that it is about."""
-    return [(inner, c) for _, inner in laws_inside(law) if inner.has_conditions() for c in inner.conditions()]
+def _conditions(model: eqx.Module) -> list[tuple[str, AbstractDamper, Any]]:
+    """Every condition between parameters, with the law that it is about and its path."""
+    inside = ((path, law) for path, law in laws_inside(model) if law.has_conditions())
+    return [(path, law, c) for path, law in inside for c in law.conditions()]
 
 
 def identifier(path: str) -> str:
@@ -103,6 +104,22 @@ class AbstractProgram:
     def values(self, owner: str = "p") -> PyTree[Symbols]:
         """All numbers, as members of an object of the program."""
         return [symbols(f"{owner}{self.member}{n.name}", n.value.shape, self.dtype) for n in self.numbers]
+
+    @cached_property
+    def margins(self) -> Program:
+        """`margins(p)`: by how much each condition between parameters holds, in the order of `conditions`."""
+
+        def margins(values: list[Array]) -> list[Array]:
+            model = self._with_numbers(values)
+            return [jnp.min(getattr(owner, c.parameter) - c.least) for _, owner, c in _conditions(model)]
+
+        return lower(margins, self.values())
+
+    @property
+    def conditions(self) -> list[str]:
+        """The conditions between parameters in words."""
+        each = _conditions(self._model)
+        return [f"{path}{c.parameter} must be greater than {c.formula}. {c.reason}" for path, _, c in each]
 
     def _symbols(self, name: str) -> Symbols:
         return symbols(name, (), self.dtype)
@@ -166,21 +183,6 @@ class LawProgram(AbstractProgram):
 
     def _derivative(self, function: Callable, arguments: tuple, changes: tuple) -> Program:
         return lower(lambda point, change: jax.jvp(function, point, change)[1], arguments, changes)
-
-    @cached_property
-    def margins(self) -> Program:
-        """`margins(p)`: by how much each condition between parameters holds, in the order of `conditions`."""
-
-        def margins(values: list[Array]) -> list[Array]:
-            law = self.law_of(values)
-            return [jnp.min(getattr(owner, c.parameter) - c.least) for owner, c in _conditions(law)]
-
-        return lower(margins, self.values())
-
-    @property
-    def conditions(self) -> list[str]:
-        """The conditions between parameters in words."""
-        return [f"{c.parameter} must be greater than {c.formula}. {c.reason}" for _, c in _conditions(self.law)]
 
     def law_of(self, values: list[Array]) -> AbstractDamper:
         """The law with other numbers, in the order of `numbers`."""

@@ -3,7 +3,6 @@
 import hashlib
 import importlib.metadata
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -25,6 +24,7 @@ from jaxdamp.dampers import AbstractDamper
 from jaxdamp.export._c_text import controller_source, law_source, vehicle_source
 from jaxdamp.export._controlled_program import ControlledProgram
 from jaxdamp.export._controller_program import ControllerProgram, program_of
+from jaxdamp.export._fmu_limits import GREATEST, in_fmi, limits, margins, tables
 from jaxdamp.export._law_program import LawNumber, LawProgram, identifier
 from jaxdamp.export._vehicle_program import LONGEST_STEP, PreparedProgram, VehicleProgram
 from jaxdamp.vehicles import AbstractVehicle
@@ -37,6 +37,7 @@ _INPUT = {"causality": "input"} | _SIGNAL
 _OUTPUT = {"causality": "output", "initial": "calculated"} | _SIGNAL
 _LOCAL = {"causality": "local", "initial": "calculated"} | _SIGNAL
 _FIXED = {"causality": "parameter", "variability": "fixed", "initial": "exact"}
+_SHORTEST = 1e-9  # s, of longest_step
 
 
 AnyProgram: TypeAlias = LawProgram | VehicleProgram | ControllerProgram
@@ -59,9 +60,12 @@ def variables(program: AnyProgram, longest_step: float) -> list[Variable]:
         signals = _of_controller(program)
     else:
         signals = _of_law(program) if isinstance(program, LawProgram) else _of_vehicle(program)
-    said = {"description": "longest step of the model; longer communication steps are divided"}
-    listed = [*signals, Variable("longest_step", "s", _FIXED | said, longest_step, (1e-9, np.inf))]
-    listed += [variable for number in program.numbers for variable in _of_number(number)]
+    words = (
+        "longest step of the model, right for its numbers as exported; shorten it for steeper laws or lighter wheels"
+    )
+    said = {"description": f"{words}. Longer communication steps are divided"}
+    listed = [*signals, Variable("longest_step", "s", _FIXED | said, longest_step, (_SHORTEST, np.inf))]
+    listed += _of_numbers(program)
     if not program.numbers:
         listed.append(Variable("none", "", _FIXED, 0.0))
     listed += _of_states(program, len(listed))
@@ -111,16 +115,19 @@ def _of_states(program: AnyProgram, first: int) -> list[Variable]:
     ]
 
 
+def _of_numbers(program: AnyProgram) -> list[Variable]:
+    return [variable for number in program.numbers for variable in _of_number(number)]
+
+
 def _of_number(number: LawNumber) -> Iterator[Variable]:
     """One variable for each number; `terms.0.knots` becomes `terms[0].knots[1]`."""
-    name = re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", number.path)
+    name = in_fmi(number.path)
     causes = {"parameter": _FIXED | {"variability": "tunable"}, "setting": _FIXED, "command": _INPUT}
     about = causes[number.kind] | {"description": number.meaning}
     for index in np.ndindex(*number.value.shape):
         place = f"[{','.join(map(str, index))}]" if index else ""
-        yield Variable(
-            name + place, number.unit, about, float(number.value[index]), (number.domain.lower, number.domain.upper)
-        )
+        ends = limits(number.domain, index[-1] if index else 0)
+        yield Variable(name + place, number.unit, about, float(number.value[index]), ends)
 
 
 def description(program: AnyProgram, known: list[Variable], name: str, guid: str) -> str:
@@ -150,8 +157,8 @@ def description(program: AnyProgram, known: list[Variable], name: str, guid: str
         attributes = {"name": variable.name, "valueReference": str(place)} | variable.about
         scalar = ET.SubElement(listed, "ScalarVariable", attributes)
         real = ET.SubElement(scalar, "Real", {"unit": variable.unit} if variable.unit else {})
-        limits = zip(("min", "max"), variable.limits, strict=True)
-        numbers = {key: limit for key, limit in limits if np.isfinite(limit)} | {"start": variable.start}
+        ends = zip(("min", "max"), variable.limits, strict=True)
+        numbers = {key: end for key, end in ends if abs(end) < GREATEST} | {"start": variable.start}
         numbers |= {"derivative": None if variable.derivative_of is None else variable.derivative_of + 1}
         real.attrib |= {key: repr(value) for key, value in numbers.items() if value is not None}
     _structure(ET.SubElement(root, "ModelStructure"), known)
@@ -203,14 +210,16 @@ def to_fmu(
     Inputs of a law are the stroke `x` and the velocity `v`, positive in extension; the output is the force `F`,
     positive when it resists extension. Inputs of a vehicle are the heights of the road under its wheels and their
     rates, such as `z_road` and `z_road_rate`; outputs are its channels. Commands of laws, such as a coil current, are
-    inputs too. Parameters are tunable parameters with units, settings are fixed ones.
+    inputs too. Parameters are tunable parameters with units, settings are fixed ones. Numbers that the law does not
+    allow, alone or together, and results that are not finite are errors, which are logged.
 
     In co-simulation a law makes its own steps (`advance`) and a vehicle those of `simulate` (the exponential engine),
-    at most `longest_step` long, without the delay of a communication step that inputs held over a step would bring. A
-    vehicle begins at rest in its static equilibrium on the first heights. Rates of the road that are not given follow
-    from the heights. In model exchange the importing tool integrates the states, with exact directional derivatives of
-    outputs and rates by inputs, states and parameters, as implicit solvers and linearisations want them. The file has
-    C sources, and a binary for this platform if there is a compiler.
+    at most `longest_step` long (shorten it for steeper laws or lighter wheels than those exported), without the delay
+    of a communication step that inputs held over a step would bring. A vehicle begins at rest in its static equilibrium
+    on the first heights. Rates of the road that are not given follow from the heights. In model exchange the importing
+    tool integrates the states, with exact directional derivatives of outputs and rates by inputs, states and
+    parameters, as implicit solvers and linearisations want them. The file has C sources, and a binary for this platform
+    if there is a compiler.
 
     A controlled vehicle and, with `part="controller"`, its controller alone are for co-simulation only, since they jump
     at their samples. Communication steps may be of any length, also different ones, that can be divided so that
@@ -242,10 +251,12 @@ def to_fmu(
         _checks.refuse("path", must, str(file), f"Try {identifier(name) + '.fmu'!r}.")
     program = program_of(law, part)
     longest = program.longest_step if isinstance(program, PreparedProgram) else LONGEST_STEP
-    listed, (code, text) = variables(program, longest), _printed(program)
-    texts = [text, *((_TEXTS / file).read_text(encoding="utf-8") for file in (code, "unit.c", "services.c"))]
+    listed = variables(program, longest)
+    code, text = _printed(program, listed)
+    files = ("checks.c", code, "unit.c", "services.c")
+    texts = [text, *((_TEXTS / file).read_text(encoding="utf-8") for file in files)]
     guid = hashlib.sha256(repr((texts, listed)).encode()).hexdigest()[:32]
-    defines = {"GUID": f'"{{{guid}}}"', "DEFAULT_STEP": repr(longest)}
+    defines = {"GUID": f'"{{{guid}}}"', "DEFAULT_STEP": repr(longest), "SHORTEST": repr(_SHORTEST)}
     if isinstance(program, ControlledProgram | ControllerProgram):
         defines |= {"PERIOD": repr(program.vehicle.period), "DELAY": repr(program.delay)}
     source = "\n".join([*(f"#define {key} {value}" for key, value in defines.items()), "", *texts])
@@ -257,13 +268,17 @@ def to_fmu(
     return write_whole(file, _archive(contents))
 
 
-def _printed(program: AnyProgram) -> tuple[str, str]:
-    """The file of this kind of model, and the functions that it calls."""
+def _printed(program: AnyProgram, known: list[Variable]) -> tuple[str, str]:
+    """The file of this kind of model, and the functions and tables that it uses."""
     if isinstance(program, LawProgram):
-        return "law.c", law_source(program, "model", ("force", "state_rate")).static()
-    if isinstance(program, ControllerProgram):
-        return "controller.c", controller_source(program, "model").static()
-    return "vehicle.c", vehicle_source(program, "model", not program.sampled).static()
+        code, source = "law.c", law_source(program, "model", ("force", "state_rate"))
+    elif isinstance(program, ControllerProgram):
+        code, source = "controller.c", controller_source(program, "model")
+    else:
+        code, source = "vehicle.c", vehicle_source(program, "model", not program.sampled)
+    functions = source._replace(functions=[*source.functions, *margins(program)]).static()
+    outputs = [variable.name for variable in known if variable.about["causality"] == "output"]
+    return code, functions + tables(program, [variable.name for variable in _of_numbers(program)], outputs)
 
 
 def _binary(contents: dict[str, bytes], name: str, compiler: str) -> dict[str, bytes]:

@@ -161,11 +161,14 @@ def _potential(evidence: Evidence) -> tuple[Callable[[Array], Array], Callable[[
     slopes = np.asarray(jax.jacfwd(coordinates.to_physical)(middle), float)
     backward = np.linalg.inv(slopes)
     half = jnp.asarray(np.linalg.cholesky(backward @ evidence.covariance @ backward.T))
-    weight = jnp.asarray(1.0 / np.where(noise.sigma > 0, noise.sigma, 1.0))
+    sigma = noise.by_sample
+    weight = jnp.asarray(1.0 / np.where(sigma > 0, sigma, 1.0))
     # Σ (r/σ)² counts every sample; noise with a memory has fewer independent ones. Priors count as they are.
-    counted = float(noise.variance / np.mean(noise.sigma[problem.used] ** 2))
+    counted = float(noise.variance / np.mean(sigma[problem.used] ** 2))
     weight = weight / jnp.where(jnp.asarray(problem.used), np.sqrt(counted), 1.0)
-    least = float(np.sum((evidence.minimum.residual * np.asarray(weight)) ** 2))
+    # Of a robust loss the rows have its second derivatives, and at the minimum its first ones.
+    shift = evidence.minimum.residual * (1.0 / np.square(noise.root) - 1.0)
+    least = float(np.sum(((evidence.minimum.residual + shift) * np.asarray(weight)) ** 2))
     power = 0.5 * (noise.dof + centre.size)
 
     def physical(z: Array) -> Array:
@@ -174,7 +177,7 @@ def _potential(evidence: Evidence) -> tuple[Callable[[Array], Array], Callable[[
     def potential(z: Array) -> Array:
         values, stretch = physical(z), jax.jacfwd(physical)(z)
         model = problem.free.build(values)
-        residual = weight * jnp.concatenate([part(model) for part in problem.residuals])
+        residual = weight * (jnp.concatenate([part(model) for part in problem.residuals]) + shift)
         rise = jnp.sum(residual**2) - least
         student = power * jnp.log1p(jnp.maximum(rise, -0.5 * noise.dof) / noise.dof)
         energy = (student if np.isfinite(noise.dof) else 0.5 * rise) - jnp.linalg.slogdet(stretch)[1]

@@ -22,14 +22,15 @@ from jaxdamp.identify.fitting import NUMERICAL, fit
 from jaxdamp.identify.held_out import on_records, without_parts
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import OFFSET, Machine, absent_paths, started_machine
-from jaxdamp.identify.model import on_rig
+from jaxdamp.identify.model import Model, on_rig, rig_of
 from jaxdamp.identify.reducing import reduced
 from jaxdamp.identify.rungs import Failure, Rung, ladder_table, verdict
 from jaxdamp.identify.scheduling import fit_scheduled, settings_stated
 from jaxdamp.identify.settings import COMPARISON, FIT, ComparisonSettings
 from jaxdamp.identify.starting import AbstractTrainedStart, Start, check_starts, frozen_by, started
+from jaxdamp.identify.stated import start_paths
 from jaxdamp.identify.vehicle_comparing import VehicleComparison, compare_vehicles
-from jaxdamp.parameters import name_patterns, parameters
+from jaxdamp.parameters import matching, name_patterns, parameters
 from jaxdamp.rig import PrintedLaw, WithPrinted, remember
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -137,8 +138,9 @@ def compare(
 
     Without `held_out`, parts of the records are left out in turn and predicted by fits to the rest, which start at the
     fit of all records: whole records in up to four groups where there are three motions or more, otherwise the quarters
-    of the records in time. A law trained before the fit (`LearntStart`) has seen all records and is judged only on
-    `held_out`.
+    of the records in time. These are left out too, for all laws, where one of them has a number for each record
+    (`per_record`) that is more than how warm it begins. A law trained before the fit (`LearntStart`) has seen all
+    records and is judged only on `held_out`.
 
     A law that cannot be fitted or scored does not stop the comparison: it is listed in `failed` with the reason.
 
@@ -229,14 +231,15 @@ def fit_each(
     of_fits = settings if scheduled else part(settings, FIT)
     named = {**of_fits, "freeze": name_patterns("freeze", settings["freeze"])}
     naming = any(named.get(option) for option in NAMED)
-    known = {name: _paths(law, runs, rig) for name, law in laws.items()} if naming else {}
+    begun = [_begun(law, runs, rig) for law in laws.values()] if naming else []
+    known, in_time = list(map(_paths, begun)), scheduled or _differ_by_record(begun, settings["per_record"])
 
     sent = (*runs, *held_out)
 
     def given(name: str, start: Start, held: tuple[str, ...] = ()) -> tuple[object, ...]:
-        own = naming_only(named, _paths(start, runs, rig), known.values()) if known else named
+        own = naming_only(named, _paths(_begun(start, runs, rig)), known) if known else named
         own = {**own, "rig": rig, "freeze": (*own["freeze"], *held)}
-        return name, start, tuple(runs), tuple(held_out), scheduled, own
+        return name, start, tuple(runs), tuple(held_out), scheduled, in_time, own
 
     def kept(inputs: tuple[object, ...], compute: Callable[[], Computed]) -> Rung | Failure:
         def outcome() -> Rung | Failure:
@@ -275,6 +278,7 @@ def _outcome(
     runs: Sequence[BenchRun],
     held_out: Sequence[BenchRun],
     scheduled: bool,
+    in_time: bool,
     how: dict[str, Any],
 ) -> Rung | Failure:
     """The fit of one law of a comparison, judged."""
@@ -284,7 +288,7 @@ def _outcome(
         if held_out:
             judged = on_records(result, held_out)
         else:
-            judged = None if isinstance(start, AbstractTrainedStart) else without_parts(result, in_time=scheduled)
+            judged = None if isinstance(start, AbstractTrainedStart) else without_parts(result, in_time=in_time)
         _ = result.error_shares  # which the table needs, computed here beside those of other laws
     except NUMERICAL as error:
         return Failure(name, str(error))
@@ -294,12 +298,28 @@ def _outcome(
     return Rung(*own, judged.fit_percent, judged.rmse, result, judged.scores, by_setting, judged.words)
 
 
-def _paths(start: Start, runs: Sequence[BenchRun], rig: Machine) -> list[str]:
-    """Paths of the parameters of a law on its machine; none where it cannot be started, which its fit then says."""
+def _begun(law: Start, runs: Sequence[BenchRun], rig: Machine) -> Model | None:
+    """A law on its machine; None where it cannot be started, which its fit then says."""
     try:
-        law = start.untrained(runs) if isinstance(start, AbstractTrainedStart) else started(start, runs)
-        machine = started_machine(rig, runs)
-        left_out = absent_paths(machine)
-        return [p.path for p in parameters(on_rig(law, machine)) if p.path not in left_out]
+        begin = law.untrained(runs) if isinstance(law, AbstractTrainedStart) else started(law, runs)
+        return on_rig(begin, started_machine(rig, runs))
     except NUMERICAL:
+        return None
+
+
+def _paths(model: Model | None) -> list[str]:
+    """Paths of the parameters of a law on its machine."""
+    if model is None:
         return []
+    left_out = absent_paths(rig_of(model))
+    return [p.path for p in parameters(model) if p.path not in left_out]
+
+
+def _differ_by_record(models: Sequence[Model | None], names: Sequence[str]) -> bool:
+    """Whether, in any of these models, such a name is that of a parameter that says more than how warm a record begins.
+
+    Then all are judged on parts in time, since errors on different parts cannot be compared.
+    """
+    patterns = name_patterns("per_record", names)
+    own = [(model, {path for name in patterns for path in matching(_paths(model), name)}) for model in models]
+    return any(model is not None and not paths <= set(start_paths(model)) for model, paths in own)

@@ -14,7 +14,7 @@ from jaxtyping import Array, Bool, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp.identify.noise import Noise
-from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.problem import Problem, Robust
 from jaxdamp.identify.residuals import AbstractResiduals
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution
@@ -27,6 +27,8 @@ CONTRADICTED = 5.0  # standard deviations from a prior that it does not allow
 NEXT_TO_NOTHING = 1e-6  # of the noise
 QUIETER = 0.8  # noise of a fit without priors, relative to that with them, below which these are wrong
 FIRST_NOISE = 0.01  # of the RMS force, before a fit says more
+FEWEST = 50  # samples of each record, from which on it has a mean influence of its own
+LEAST_SLOPE = 0.05  # of the influence, relative to the weight: far samples of a redescending loss say nothing
 HALF = 0.5  # weight below which a sample is counted as left out
 
 
@@ -165,7 +167,7 @@ class Round(NamedTuple):
             plain.reweighted(np.sqrt(weight))
             .at_noise(noise)
             ._replace(
-                noise_factor=noise_factor(LOSSES[loss], relative[used]),
+                robust=None if loss == "squares" else robust_of(LOSSES[loss], relative, used, plain.owner),
                 share_left_out=float(np.mean(weight[used] < HALF)),
             )
         )
@@ -211,7 +213,7 @@ def _without_its_own_noise(
     """
     problem, beside = found[0], found[1].noise or 0.0
     alone = solve(problem.at_noise(NEXT_TO_NOTHING * beside), starts).best
-    level = float(np.sqrt(noise(problem, alone).variance)) if alone.finite else np.inf
+    level = noise(problem, alone).level if alone.finite else np.inf
     if not level < QUIETER * beside or problem.is_rounding(alone.squares):
         return found
     weighed = problem.at_noise(level)
@@ -234,7 +236,7 @@ def _in_rounds(
         best = solution.best
         if not best.finite or problem.is_rounding(best.squares):
             break
-        level = float(np.sqrt(noise(now.problem, best).variance))
+        level = noise(now.problem, best).level
         after = now.after(problem, best.residual, level, loss, spread)
         if after is None:
             break
@@ -264,12 +266,21 @@ def against_priors(
     return said
 
 
-def noise_factor(loss: Loss, relative: np.ndarray) -> float:
-    """Factor from the noise that weighted residuals show to that which the errors of an M-estimate follow."""
-    weight = loss.weight(relative)
-    shown = np.mean(weight * relative**2) / np.mean(weight)
-    slope = np.mean(loss.slope(relative))
-    return float(np.sqrt(np.mean((weight * relative) ** 2) / slope**2 / shown)) if shown > 0 and slope > 0 else 1.0
+def robust_of(
+    loss: Loss, relative: Float[np.ndarray, " samples"], used: Bool[np.ndarray, " samples"], owner: np.ndarray
+) -> Robust:
+    """How the errors follow from the weighted residuals, by the mean influence in each record if none is short."""
+    groups = [np.flatnonzero(used & (owner == i)) for i in np.unique(owner[used])]
+    each = len(groups) > 1 and min(map(len, groups)) >= FEWEST
+    factor, root = np.ones(relative.size), np.ones(relative.size)
+    for rows in groups if each else [np.flatnonzero(used)]:
+        u = relative[rows]
+        weight = loss.weight(u)
+        slope = max(float(np.mean(loss.slope(u))), LEAST_SLOPE * float(np.mean(weight)))
+        root[rows] = np.sqrt(slope / np.mean(weight))
+        shown = float(np.mean(weight * u * u))
+        factor[rows] = np.sqrt(np.mean((weight * u) ** 2) / slope / shown) if shown > 0 else 1.0
+    return Robust(factor, root, each)
 
 
 def criterion_in_words(problem: Problem, loss: str, priors: Mapping[str, Sequence[float]]) -> str:

@@ -255,11 +255,13 @@ def uncertainty(
 ) -> Uncertainty:
     """Covariance at a minimum, (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹ with the covariance Σ of the noise, without edges of parameters.
 
+    Of a robust loss, JᵀJ are its second derivatives: the rows of J have the factor `noise.root`.
+
     A parameter at an edge of its range thus counts as unknown in the errors of the others; if it were taken as fixed,
     their errors would be too small. A direction with a singular value below `RANK_TOLERANCE` of the largest does not
     change the force: its parameters get an infinite variance instead of a result of rounding errors.
     """
-    scaled, scale = unit_columns(jacobian)
+    scaled, scale = unit_columns(jacobian * np.reshape(noise.root, (-1, 1)))
     singular, directions = determined(scaled)
     inverse = (directions.T / singular**2) @ directions
     lost = np.sum(directions**2, axis=0) < 1.0 - 1e-3
@@ -267,7 +269,7 @@ def uncertainty(
     whole[lost, :] = whole[:, lost] = 0.0
     whole[lost, lost] = np.inf
     errors = np.sqrt(np.diag(whole))
-    step = -inverse @ (scaled.T @ residual)
+    step = -inverse @ (scaled.T @ (residual / noise.root))
     steps = np.divide(step, errors, out=np.zeros_like(step), where=errors > 0)
     return Uncertainty(whole / np.outer(scale, scale), steps)
 

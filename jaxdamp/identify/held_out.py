@@ -21,7 +21,6 @@ from jaxdamp.identify.predicting import Compared, Score, compared, errors
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.propagation import Evidence
 from jaxdamp.identify.start_temperatures import warmed
-from jaxdamp.identify.stated import start_paths
 from jaxdamp.parameters import get, with_values
 
 
@@ -56,8 +55,8 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
     or more are beyond the velocities of all others, the fit of all is judged on them, since its error there counts
     too. A number that the other parts do not determine keeps its value of the fit of all records.
 
-    With `in_time` whole records are never left out, since the fit has numbers that only one record determines. None
-    where no part can be left out.
+    With `in_time` whole records are never left out, for fits with numbers that only one record determines and for those
+    that are compared with them. None where no part can be left out.
     """
     evidence = result.evidence
     assert evidence is not None
@@ -65,7 +64,7 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
     fitted = np.flatnonzero(np.isfinite(problem.sigma))
     runs = [problem.runs[i] for i in fitted]
     groups = motions(runs)
-    whole = not in_time and _as_wholes(result, problem, groups)
+    whole = not in_time and len(groups) >= FEWEST_MOTIONS
     samples: list[Compared] = []
     unreached = [np.zeros(len(run), bool) for run in runs]
     left_out = _by_record(runs, groups) if whole else zip(*map(in_time_parts, runs), strict=True)
@@ -90,11 +89,6 @@ def _quarters(runs: Sequence[BenchRun], *, alike: bool) -> str:
     if all(run.of_points for run in runs):
         return f"each quarter of the points{_WITHOUT}"
     return f"each quarter of the record{'s' * (len(runs) > 1)}{_WITHOUT}" + ", all of one motion" * alike
-
-
-def _as_wholes(result: FitResult, problem: Problem, groups: Sequence[Sequence[int]]) -> bool:
-    """Whether whole records can be left out: of several motions, with no own number but how warm they begin."""
-    return len(groups) >= FEWEST_MOTIONS and set(problem.per_record) <= set(start_paths(result.model))
 
 
 def _reached(runs: Sequence[BenchRun], part: Part) -> Part:

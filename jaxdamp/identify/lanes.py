@@ -13,7 +13,7 @@ from jaxdamp._types import Scalar
 from jaxdamp.identify.criteria import NEXT_TO_NOTHING, QUIETER, ROUNDS, SETTLED, Priors, Round
 from jaxdamp.identify.dependence import Dependence, Products
 from jaxdamp.identify.initial_states import DRIFT
-from jaxdamp.identify.noise import CORRELATED, correlation_time, levels_differ
+from jaxdamp.identify.noise import CORRELATED, correlation_time, levels_differ, own_levels
 from jaxdamp.identify.predicting import fit_percent, score
 from jaxdamp.identify.problem import ROUNDING, Problem
 from jaxdamp.identify.search import Here, Searches, searches_of
@@ -70,9 +70,11 @@ class Lanes(NamedTuple):
             return (self.force_noise / np.array(problem.sigma)) ** 2
         squares, sizes = (np.array(each, float) for each in zip(*((p @ p, p.size) for p in parts), strict=True))
         alike = correlation_time(parts)
-        wider = problem.noise_factor**2 * (alike if alike > CORRELATED else 1.0)
-        if not (problem.each or (alike <= CORRELATED and levels_differ(problem, parts))):
-            return np.full(sizes.shape, wider * np.sum(squares) / max(np.sum(sizes) - free, 1))
+        wider = np.full(sizes.shape, alike if alike > CORRELATED else 1.0)
+        if problem.robust is not None:
+            wider *= [np.max(part, initial=0.0) ** 2 for part in self.of_records(damper, problem.robust.factor)]
+        if not (problem.each or own_levels(problem.robust) or (alike <= CORRELATED and levels_differ(problem, parts))):
+            return wider * np.sum(squares) / max(np.sum(sizes) - free, 1)
         return wider * squares / np.maximum(sizes * (1.0 - free / np.sum(sizes)), 1)
 
     def mean(self, damper: int, of_records: Float[np.ndarray, " records"]) -> float:
@@ -178,15 +180,18 @@ def judged(lanes: Lanes, end: SearchLanes, depends: Dependence | None) -> dict[s
         values[i] = here.values
         variances = lanes.variances(i, here.whole[:, -1], free if depends is None else depends.size / count)
         variances /= problem.level**2
-        whole = lanes.searches[i].products(here)[:-1, :-1]
-        noise.append(_Noise(here.units, whole, float(variances.min()), lanes.excess(i, here, variances)))
+        curved = here  # with rows of the second derivatives of the loss
+        if problem.robust is not None:
+            curved = here._replace(whole=here.whole * problem.robust.root[:, None])
+        whole = lanes.searches[i].products(curved)[:-1, :-1]
+        noise.append(_Noise(here.units, whole, float(variances.min()), lanes.excess(i, curved, variances)))
         periodic = [part for part in problem.residuals if isinstance(part, Batch) and part.cycle is not None]
         drift[i] = max(
             [float(_drift(problem.free, jnp.asarray(here.values), batch)) for batch in periodic], default=0.0
         )
         percent[i], rmse[i], each = _errors(lanes, i, here, settled=bool(drift[i] <= DRIFT))
         by_record.append(each)
-    errors_of_numbers = _standard_errors(end, noise, depends)
+    errors_of_numbers = _standard_errors(noise, depends)
     named = {"values": values, "standard_errors": errors_of_numbers, "fit_percent": percent, "rmse": rmse}
     return named | {"record_rmse": tuple(by_record), "drift": drift}
 
@@ -233,20 +238,19 @@ class _Noise(NamedTuple):
         return self.excess + (self.least - least) * self.products
 
 
-def _standard_errors(
-    end: SearchLanes, noise: Sequence[_Noise], depends: Dependence | None
-) -> Float[np.ndarray, "dampers free"]:
+def _standard_errors(noise: Sequence[_Noise], depends: Dependence | None) -> Float[np.ndarray, "dampers free"]:
     """Standard errors of the numbers of each damper: (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹ with the variance Σ of each record."""
-    count, free = end.y.shape
     if depends is None:
-        each = [_covariance(end.aux[i], one.least, one.excess) for i, one in enumerate(noise)]
+        each = [_covariance(one.products, one.least, one.excess) for one in noise]
     else:
-        least, beyond = min(one.least for one in noise), np.zeros((depends.size, depends.size))
+        least, whole, beyond = min(one.least for one in noise), *np.zeros((2, depends.size, depends.size))
         for i, one in enumerate(noise):
             columns, rows = depends.rows(i)
+            whole[np.ix_(columns, columns)] += rows.T @ one.products @ rows
             beyond[np.ix_(columns, columns)] += rows.T @ one.beyond(least) @ rows
-        each = [_covariance(end.aux[0], least, beyond)] * count
-    errors = np.zeros((count, free))
+        each = [_covariance(whole, least, beyond)] * len(noise)
+    free = len(noise[0].units)
+    errors = np.zeros((len(noise), free))
     for i, (covariance, lost) in enumerate(each):
         columns, rows = (np.arange(free), np.eye(free)) if depends is None else depends.rows(i)
         to_values = noise[i].units @ rows
@@ -257,14 +261,13 @@ def _standard_errors(
 
 
 def _covariance(
-    products: Float[np.ndarray, "columns columns"], least: float, beyond: Float[np.ndarray, "free free"]
+    products: Float[np.ndarray, "free free"], least: float, beyond: Float[np.ndarray, "free free"]
 ) -> tuple[Float[np.ndarray, "free free"], Bool[np.ndarray, " free"]]:
     """The covariance of coordinates, and which take part in directions that change no force.
 
-    By the products of the columns of the Jacobian and the residual, the variance that every sample has, and the
-    products weighted by the variances beyond it.
+    By the products of the columns of the Jacobian, the variance that every sample has, and the products weighted by
+    the variances beyond it.
     """
-    products = products[:-1, :-1]
     norms = np.sqrt(np.diag(products))
     scale = np.where(norms > 0, norms, 1.0)
     squares, directions = np.linalg.eigh(products / np.outer(scale, scale))

@@ -8,7 +8,7 @@ import scipy.special
 from jaxtyping import Bool, Float, Int
 
 from jaxdamp._triangles import orthonormal, unit_columns
-from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.problem import Problem, Robust
 from jaxdamp.identify.search import SearchEnd
 
 
@@ -36,6 +36,7 @@ class Noise(NamedTuple):
         inflation: factor on the standard errors due to autocorrelation, root of the mean over the directions of the
             parameters.
         systematic: whether the residual repeats from cycle to cycle.
+        root: factor on the rows of derivatives, of a robust loss (`Robust`).
     """
 
     sigma: Float[np.ndarray, " samples"]
@@ -45,10 +46,22 @@ class Noise(NamedTuple):
     dof: float
     inflation: float = 1.0
     systematic: bool = False
+    root: Float[np.ndarray, " samples"] | float = 1.0
+
+    @property
+    def by_sample(self) -> Float[np.ndarray, " samples"]:
+        """The standard deviation beside which each weighted residual counts."""
+        return self.sigma / self.root
+
+    @property
+    def level(self) -> float:
+        """Standard deviation of a sample with its memory, beside which priors count."""
+        rows = np.concatenate(self.records)
+        return float(np.sqrt(self.variance * _mean_square(self.sigma[rows]) / _mean_square(self.by_sample[rows])))
 
     def with_sigma(self, sigma: Float[np.ndarray, " samples"]) -> "Noise":
         """The same with these standard deviations, which contain the inflation."""
-        return self._replace(sigma=sigma, variance=float(np.mean(sigma[np.concatenate(self.records)] ** 2)))
+        return self._replace(sigma=sigma, variance=_mean_square(sigma[np.concatenate(self.records)]))
 
     def covariance_of(self, matrix: Float[np.ndarray, "samples free"]) -> Float[np.ndarray, "free free"]:
         """Aᵀ Σ A with the covariance Σ of the noise: the covariance of the products Aᵀ noise."""
@@ -60,10 +73,17 @@ class Noise(NamedTuple):
                 total += part.T @ (_toeplitz_product(alike, part) - part)
         return total
 
-    def scaled(self, factor: float, used: Bool[np.ndarray, " samples"]) -> "Noise":
-        """The same a factor larger; residuals that are not used, priors, have the level of a sample with its memory."""
-        sigma = factor * np.where(used, self.sigma, np.sqrt(self.variance))
-        return self._replace(sigma=sigma, variance=factor**2 * self.variance)
+    def of_loss(self, robust: Robust | None, used: Bool[np.ndarray, " samples"]) -> "Noise":
+        """The same beside a robust loss; residuals that are not used, priors, have the level of a sample."""
+        if robust is not None:
+            sigma, before = robust.factor * self.sigma, _mean_square(self.sigma[used])
+            wider = _mean_square((sigma / robust.root)[used]) / before if before > 0 else 1.0
+            self = self._replace(sigma=sigma, variance=wider * self.variance, root=robust.root)
+        return self._replace(sigma=np.where(used, self.sigma, self.level))
+
+
+def _mean_square(values: Float[np.ndarray, " _"]) -> float:
+    return float(np.mean(values**2))
 
 
 def independent(sigma: Float[np.ndarray, " samples"], used: Bool[np.ndarray, " samples"], free: int) -> Noise:
@@ -74,8 +94,8 @@ def independent(sigma: Float[np.ndarray, " samples"], used: Bool[np.ndarray, " s
 
 def noise_of(problem: Problem, found: SearchEnd, force_noise: float | None) -> Noise:
     """The noise of all residuals; that of records as `_noise_of_records`, that of priors at its level."""
-    factor = 1.0 if force_noise is not None else float(problem.noise_factor)
-    return _noise_of_records(problem, found, force_noise).scaled(factor, problem.used)
+    robust = problem.robust if force_noise is None else None
+    return _noise_of_records(problem, found, force_noise).of_loss(robust, problem.used)
 
 
 def _noise_of_records(problem: Problem, found: SearchEnd, force_noise: float | None) -> Noise:
@@ -83,7 +103,7 @@ def _noise_of_records(problem: Problem, found: SearchEnd, force_noise: float | N
 
     The residual of each record gets an autoregression (Yule-Walker), whose order minimises a criterion like Schwarz's
     with `PENALTY` times its penalty. If all orders are zero, the noise is white, with one level for all records, or
-    one for each if their levels differ by more than chance or the problem weights them so. Otherwise:
+    one for each if their levels differ by more than chance, or the problem or a robust loss weights them so. Otherwise:
 
     - If the residual repeats from cycle to cycle, it is no noise: the law misses something. It then counts as white
       noise of so few samples as its correlation time leaves, which is the most that its errors can be.
@@ -101,7 +121,7 @@ def _noise_of_records(problem: Problem, found: SearchEnd, force_noise: float | N
     correlations = [np.ones(1)] if problem.is_rounding(found.squares) else [autocorrelation(part) for part in parts]
     is_white = all(alike.size == 1 for alike in correlations)
     if is_white or repeats(problem, parts):
-        each = problem.each or (is_white and levels_differ(problem, parts))
+        each = problem.each or own_levels(problem.robust) or (is_white and levels_differ(problem, parts))
         level = np.sqrt(count / white.dof) * _levels(found.residual, records, each)
         if is_white:
             return white.with_sigma(level)
@@ -112,13 +132,18 @@ def _noise_of_records(problem: Problem, found: SearchEnd, force_noise: float | N
     return _corrected(noise, orthonormal(np.where(used[:, None], found.jacobian, 0.0)))
 
 
+def own_levels(robust: Robust | None) -> bool:
+    """Whether records have their own levels because of a robust loss."""
+    return robust is not None and robust.each
+
+
 def levels_differ(problem: Problem, parts: Sequence[Float[np.ndarray, " _"]]) -> bool:
     """Whether the levels of white noise in several records differ by more than chance (Bartlett's test).
 
     Not of the residuals of a robust fit, whose spikes are no normal noise.
     """
     parts = [part for part in parts if part.any()]
-    if len(parts) < 2 or problem.noise_factor != 1.0:
+    if len(parts) < 2 or problem.robust is not None:
         return False
     counts, squares = np.array([(part.size, part @ part) for part in parts]).T
     statistic = counts.sum() * np.log(squares.sum() / counts.sum()) - counts @ np.log(squares / counts)
@@ -137,7 +162,7 @@ def channel_noise(problem: Problem, residual: Float[np.ndarray, " samples"], fre
     for i, part in parts.items():
         sigma[owner == i] = widened * np.sqrt(np.mean(part**2))
     noise = independent(sigma, used, free)._replace(inflation=inflation)
-    return noise.scaled(float(problem.noise_factor), used)
+    return noise.of_loss(problem.robust, used)
 
 
 def _corrected(noise: Noise, basis: Float[np.ndarray, "samples rank"]) -> Noise:

@@ -23,6 +23,19 @@ ROUNDING = 1e-8  # residual, relative to the force, below which there is nothing
 SENSORS = "sensors."  # with which the paths of numbers begin that act on channels after a simulation
 
 
+class Robust(NamedTuple):
+    """How the errors of an M-estimate follow from the residuals that its weights leave.
+
+    With the influence ψ(u) of a residual u and its weight w = ψ/u, the estimate has the covariance
+    (Σ ψ' J Jᵀ)⁻¹ (Σ ψ² J Jᵀ) (Σ ψ' J Jᵀ)⁻¹, where ψ' and ψ² are means: of each record, whose noise may have a level of
+    its own, or of all where records are short. Rows of derivatives are already weighted by √w.
+    """
+
+    factor: Float[np.ndarray, " samples"]  # √(ψ²/ψ'/(w u²)): from the RMS of a weighted residual to the noise
+    root: Float[np.ndarray, " samples"]  # √(ψ'/w), by which the rows of derivatives are multiplied
+    each: bool  # whether records have their own
+
+
 class Problem(NamedTuple):
     """A fit to be solved, a pytree, and its residual function for a program of your own (`docs/from_jax.md`).
 
@@ -44,7 +57,7 @@ class Problem(NamedTuple):
         sample_steps: time [s] from one sample of the residuals to the next, for each record.
         places: where the samples of each record of a bench are in the residuals.
         initial_state: how the records start, of `INITIAL_STATES`.
-        noise_factor: factor on the noise that weighted residuals show, because of a robust loss.
+        robust: how standard errors follow from the residuals that the weights of a robust loss leave; None of squares.
         share_left_out: share of the samples that a robust loss gives less than half weight.
         anchor: values that free numbers keep where the records say nothing of them, and the weight of one unit of each
             beside the residuals; None for a fit without.
@@ -64,7 +77,7 @@ class Problem(NamedTuple):
     sample_steps: tuple[float, ...] = ()
     places: tuple[slice, ...] = ()
     initial_state: str = "warm_up"
-    noise_factor: float = 1.0
+    robust: Robust | None = None
     share_left_out: float = 0.0
     anchor: tuple[Float[np.ndarray, " free"], Float[np.ndarray, " free"]] | None = None
     noise_known: bool = True

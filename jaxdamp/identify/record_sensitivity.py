@@ -150,7 +150,7 @@ def sensitivity_to_records(
 
 def _refuse_weights(problem: Problem, criterion: str) -> None:
     """Refuse a fit whose weights depend on the residual; rest that is left out, or periodic records, do not."""
-    if problem.noise_factor != 1.0 or any(isinstance(part, Priors) for part in problem.residuals):
+    if problem.robust is not None or any(isinstance(part, Priors) for part in problem.residuals):
         remedy = "Fit with `loss='squares'` and without priors, whose weights depend on the residual."
         _checks.refuse("result", "be a fit by plain least squares", f"one by {criterion}", remedy)
 

@@ -17,7 +17,7 @@ from jaxdamp._tables import Column, Contents, Table, plain
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Figure
 from jaxdamp.bench import BenchRun, as_runs, contradictions, usable
-from jaxdamp.dampers import AbstractDamper, Scheduled, takes_command
+from jaxdamp.dampers import Scheduled, takes_command
 from jaxdamp.identify.blending import AtSetting, Choice, choose_blend, with_blended_forces
 from jaxdamp.identify.contradicting import refuse_contradicting
 from jaxdamp.identify.estimating import undetermined
@@ -25,13 +25,13 @@ from jaxdamp.identify.fitting import fit, solve
 from jaxdamp.identify.judging import fitted_models
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import OFFSET, Machine, held_constant_forces, refuse_lag_of_held, without_command_lag
-from jaxdamp.identify.model import law_of, rig_of
+from jaxdamp.identify.model import law_of, own_names, rig_of
 from jaxdamp.identify.predicting import score
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.settings import FIT, PROBLEM, SCHEDULED, FitSettings, ScheduledSettings
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.identify.stated import COMMAND_REMEDY, refuse_lacking, stated_parameters
-from jaxdamp.parameters import get, match_paths, name_patterns, parameters, with_values
+from jaxdamp.parameters import free_parameters, get, match_paths, name_patterns, parameters, with_values
 from jaxdamp.rig import Rig
 
 
@@ -300,27 +300,37 @@ class Chain:
         command varies are between the settings; they are left out together with any setting.
         """
         laws = [at.law for at in alone.values()]
-        alike = Scheduled.of_equal_structure(laws)
-        shared = self._shared_by(laws)
+        shared = self._shared_by(alone)
         means = {path: np.mean([np.asarray(get(law, path)) for law in laws], axis=0) for path in shared}
         varying = self.varying if list(alone) == self.settings else []
-        machine = _mean_machine(alone, self.command_lag if varying else 0.0)
+        machine = _mean_machine(alone, self.command_lag * bool(varying))
         place = "laws" if machine is None else "law.laws"
         tie = {f"{place}.{k}.{path}": f"{place}.0.{path}" for path in shared for k in range(1, len(laws))}
+        for k, at in enumerate(alone.values()):
+            tie |= self._tied_at(at, f"{place}.{k}.")
         blended = tuple(with_values(law, means) for law in laws)
-        at_levels = alike and not (varying and blend == "force")
+        at_levels = Scheduled.of_equal_structure(laws) and not (varying and blend == "force")
         scheduled = Scheduled(blended, list(alone), min(alone), "parameters" if at_levels else "force")
         held = held_constant_forces(scheduled, machine)
         how: FitSettings = {**self.how, "starts": 1, "tie": tie, "freeze": [*self.how["freeze"], *held]}
         result = fit(scheduled, [*self.held(alone), *varying], rig=machine, **how)
         return with_blended_forces(result) if at_levels and blend == "force" else result
 
-    def _shared_by(self, laws: Sequence[AbstractDamper]) -> list[str]:
-        """The paths of the parameters that are common to all settings."""
-        paths = [[p.path for p in parameters(law)] for law in laws]
+    def _tied_at(self, at: AtSetting, level: str) -> dict[str, str]:
+        """The ties of the call at one setting, with the path of this level before those of the law."""
+        names, inside = own_names(at.model).find_keys("tie", self.how["tie"]), "" if at.rig is None else "law."
+        ties = free_parameters(at.model, tie=names, move=True).ties
+        return dict([[p if p.startswith("rig.") else level + p.removeprefix(inside) for p in pair] for pair in ties])
+
+    def _shared_by(self, alone: Alone) -> list[str]:
+        """The paths of the parameters that are common to all settings; of tied ones, that which the others follow."""
+        paths = [[p.path for p in parameters(at.law)] for at in alone.values()]
         in_all = [path for path in paths[0] if all(path in of_law for of_law in paths)]
-        stated = stated_parameters(laws[0], self.runs)  # each level has them as its records state them
-        return [path for path in match_paths(in_all, name_patterns("common", self.common)) if path not in stated]
+        first = next(iter(alone.values()))
+        stated, tied = stated_parameters(first.law, self.runs), self._tied_at(first, "")
+        named = [*match_paths(in_all, name_patterns("common", self.common)), *(p for p in tied if p.startswith("rig."))]
+        shared = dict.fromkeys(tied.get(path, path) for path in named)
+        return [path for path in shared if path in in_all and path not in stated]  # each level has them as stated
 
     def without(self, setting: float, blend: str, shown: Callable[[str], None]) -> LeftOutSetting:
         """The score at a setting of the law interpolated from all others; its records have no part in any start."""

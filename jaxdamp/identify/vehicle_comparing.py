@@ -30,7 +30,7 @@ from jaxdamp.identify.vehicle_result import (
     fitted_channels,
     table_of_scores,
 )
-from jaxdamp.parameters import parameters
+from jaxdamp.parameters import matching, name_patterns, parameters
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -220,12 +220,14 @@ def fit_each_vehicle(
     sensors = dict(options.get("sensors") or {})
     tests = {name: VehicleTest(vehicle, sensors) for name, vehicle in vehicles.items()}
     known = {name: [p.path for p in parameters(test)] for name, test in tests.items()}
+    of_drives = name_patterns("per_record", options.get("per_record") or ())
+    in_time = any(matching(paths, name) for paths in known.values() for name in of_drives)
 
     def fitted(name: str, vehicle: AbstractVehicle) -> VehicleRung | Failure:
         own = naming_only(options, known[name], known.values())
         try:
             result = fit_vehicle(vehicle, rides, **own)
-            judged = on_drives(result, held_out) if held_out else without_drives(result)
+            judged = on_drives(result, held_out) if held_out else without_drives(result, in_time=in_time)
         except (ValueError, ArithmeticError) as error:
             return Failure(name, str(error))
         return VehicleRung(name, result, *judged)
@@ -233,18 +235,18 @@ def fit_each_vehicle(
     yield from side_by_side(fitted, vehicles, progress)
 
 
-def without_drives(result: VehicleFit) -> tuple[tuple[ChannelScore, ...], str]:
+def without_drives(result: VehicleFit, *, in_time: bool = False) -> tuple[tuple[ChannelScore, ...], str]:
     """The errors of a fit on its own drives, each predicted by a fit to the others, and in words what was left out.
 
     The fits start at the minimum of all. Of two drives or more, each is left out (in up to four groups). The quarters
-    in time are left out instead if there is one drive, or if numbers or initial motions of single drives are fitted,
-    which no other drive determines; the vehicle is driven through the part left out. Weights stay those of the fit of
-    all drives.
+    in time are left out instead if there is one drive, or if initial motions of single drives are fitted, which no
+    other drive determines, or with `in_time`, for numbers of single drives of this vehicle or of one that it is
+    compared with; the vehicle is driven through the part left out. Weights stay those of the fit of all drives.
     """
     evidence = result.evidence
     assert evidence is not None
     problem, rides = anchored_at(evidence), result.records
-    whole = len(rides) > 1 and not problem.per_record and not problem.free.tree.starts
+    whole = len(rides) > 1 and not in_time and not problem.free.tree.starts
     scores = list[ChannelScore]()
     for number in range(min(PARTS, len(rides)) if whole else PARTS):
         if whole:

@@ -172,7 +172,7 @@ def _regressed(problem: Problem, end: SearchEnd, effects: Sequence[np.ndarray]) 
     inverse = np.linalg.pinv(own[:, shown])
     sizes = inverse @ rest
     left = rest - own[:, shown] @ sizes
-    errors = np.linalg.norm(inverse * channel_noise(problem, left, end.values.size).sigma, axis=1)
+    errors = np.linalg.norm(inverse * channel_noise(problem, left, end.values.size).by_sample, axis=1)
     return _Regression(shown, sizes, errors, float(left @ left) / max(float(rest @ rest), 1e-300))
 
 

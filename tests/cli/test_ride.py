@@ -102,7 +102,7 @@ def test_a_controller_is_compared_with_the_law_at_its_own_command(tmp_path: Path
     assert (out / "ride_sheet.png").exists() and "damper_command" in (out / "channels_law.csv").read_text()
     jaxdamp("export", out / "vehicle.json", "--to", "c", "--part", "controller", "--file", tmp_path / "ecu.c")
     assert "p->policy_gain = 3000.0;" in (tmp_path / "ecu.c").read_text()
-    with pytest.raises(AssertionError, match="that takes one, but is .* beside Linear"):
+    with pytest.raises(AssertionError, match=r"that takes one, but is .* beside Linear"):
         linear = _written(Linear(1500.0), tmp_path / "linear.json")
         jaxdamp("ride", "quarter_car_000", "--start", linear, *words, "--out", tmp_path / "other")
 

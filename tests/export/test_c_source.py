@@ -11,10 +11,12 @@ from jaxdamp.dampers import (
     Besinger,
     BoucWen,
     CoulombFriction,
+    FittedRange,
     GasSpring,
     Lag,
     Linear,
     PiecewiseLinear,
+    with_fitted_range,
 )
 from jaxdamp.export import to_c
 from jaxdamp.export._c_text import numbered
@@ -81,6 +83,15 @@ def test_the_header_explains_every_number(tmp_path):
     assert "/* law.slopes [N s/m] positive: " in text and "double law_slopes[3];" in text
     assert "/* law.knee_width [m/s] not negative, setting: " in text
     assert "#define SHIM_STATES 0" in text and "shim_force_derivative" not in text
+
+
+@pytest.mark.filterwarnings("error")  # its own test motion is faster than the records
+def test_the_fitted_range_is_in_the_header_and_no_warning_of_the_test_motion(tmp_path):
+    law = with_fitted_range(Linear(2000.0), FittedRange(velocity=(-0.01, 0.02)))
+    header = to_c(law, tmp_path / "law.c")[0].read_text(encoding="utf-8")
+    assert " * The law was fitted to: velocity −0.01 to 0.02 m/s.\n" in header
+    header = to_c(quarter_car_000(law), tmp_path / "car.c")[0].read_text(encoding="utf-8")
+    assert " * damper was fitted to: velocity −0.01 to 0.02 m/s.\n" in header
 
 
 def test_the_text_is_the_same_every_time(tmp_path):

@@ -43,6 +43,37 @@ def test_standard_errors_of_robust_fits_hold_with_normal_noise(sines):
     assert robust[0]["rate"].standard_error == pytest.approx(1.026 * plain["rate"].standard_error, rel=0.03)
 
 
+def test_errors_of_robust_fits_follow_the_noise_of_each_record(sines, rng):
+    """Huber's estimate of two slopes by hand, with its sandwich covariance by the influence in each record."""
+    runs = [
+        dataclasses.replace(run, force=run.force + level * rng.standard_normal(len(run)))
+        for run, level in zip(sines(TRUTH, noise=0.0, tests=[(0.02, 1.0), (0.01, 4.0)]), (5.0, 80.0), strict=True)
+    ]
+    force = np.concatenate([run.force for run in runs])
+    owner = np.repeat([0, 1], [len(run) for run in runs])
+    velocity = np.concatenate([run.velocity for run in runs])
+    slopes = np.stack([np.maximum(velocity, 0.0), np.minimum(velocity, 0.0)], axis=1)
+    rates, missed, far = np.zeros(2), force, 1e9
+    for _ in range(60):
+        weighted = np.minimum(1.0, far / np.maximum(np.abs(missed), 1e-9))[:, None] * slopes
+        rates = np.linalg.solve(weighted.T @ slopes, weighted.T @ force)
+        missed = force - slopes @ rates
+        far = 1.345 * 1.4826 * np.median(np.abs(missed))
+    bread, meat = np.zeros((2, 2)), np.zeros((2, 2))
+    for of_record in (owner == 0, owner == 1):
+        products, here = slopes[of_record].T @ slopes[of_record], missed[of_record]
+        bread += np.mean(np.abs(here) < far) * products
+        meat += np.mean(np.clip(here, -far, far) ** 2) * products
+    errors = np.sqrt(np.diag(np.linalg.inv(bread) @ meat @ np.linalg.inv(bread)))
+    start = Bilinear(2000.0, 2000.0)
+    one = fit(start, runs, loss="huber", samples_per_cycle=None, starts=1)
+    many = fit(start, {"a": runs, "b": runs}, loss="huber", samples_per_cycle=None)
+    for i, name in enumerate(("rebound_rate", "compression_rate")):
+        assert one[name].value == pytest.approx(rates[i], abs=0.02 * errors[i])
+        assert one[name].standard_error == pytest.approx(errors[i], rel=0.02)
+        assert many.standard_errors[0, i] == pytest.approx(one[name].standard_error, rel=1e-4)
+
+
 def test_a_prior_is_weighed_against_the_records(sines):
     runs = sines(Linear(1500.0), noise=20.0)
     alone = fit(Linear(1000.0), runs, force_noise=20.0)["rate"]

@@ -7,7 +7,7 @@ import pytest
 
 from jaxdamp import identify
 from jaxdamp.bench import SineTest, VirtualDyno
-from jaxdamp.dampers import Bilinear, Lag, Linear, PiecewiseLinear, Polynomial, SeriesSpring
+from jaxdamp.dampers import Bilinear, CoulombFriction, Lag, Linear, PiecewiseLinear, Polynomial, SeriesSpring
 from jaxdamp.identify import compare, cross_validate
 from jaxdamp.identify.held_out import motions
 from jaxdamp.identify.model import is_memoryless
@@ -114,6 +114,16 @@ def test_numbers_of_one_record_are_never_judged_without_it(sines):
     runs = sines(TRUTH, noise=20.0)
     (rung,) = compare({"bilinear": Bilinear}, runs, per_record=["force_offset"], rig=["offset"]).rungs
     assert rung.judged_on.startswith("each quarter") and rung.held_out_rmse == pytest.approx(20.0, rel=0.1)
+
+
+def test_laws_are_judged_on_the_same_parts_if_only_some_have_numbers_of_one_record(sines):
+    lagging = VirtualDyno(Lag(Linear(1500.0), 0.006), sampling_rate=400.0, force_noise=20.0)
+    runs = lagging.run([SineTest(0.01, f, cycles=2) for f in (1.0, 3.0, 6.0)])
+    rubbing = Lag(Linear(1500.0) + CoulombFriction(20.0, 0.02), 0.003)
+    comparison = compare({"linear": Linear, "rubbing": rubbing}, runs, per_record=["friction_force"], rig=None)
+    names = [[score.name for score in rung.scores] for rung in comparison.rungs]
+    assert comparison.best.name == "rubbing_reduced" and names[0] == names[1] == names[2] and len(names[0]) == 12
+    assert {rung.judged_on for rung in comparison.rungs} == {"each quarter of the records predicted by fits without it"}
 
 
 def test_a_curve_that_the_error_asks_for_is_proposed_by_name(sines, comparison):

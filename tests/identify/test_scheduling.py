@@ -4,14 +4,16 @@ import dataclasses
 import json
 from typing import Any
 
+import numpy as np
 import pytest
 
 from jaxdamp import identify
 from jaxdamp.bench import SineTest, VirtualDyno
-from jaxdamp.dampers import Bilinear, Lag, Linear, ModifiedBoucWen, Scaled, Scheduled, with_command
+from jaxdamp.dampers import Bilinear, Lag, Linear, ModifiedBoucWen, Scaled, Scheduled, Spring, with_command
 from jaxdamp.identify.recommending import not_worse
 from jaxdamp.identify.rungs import cannot_choose
 from jaxdamp.parameters import get
+from jaxdamp.rig import Rig
 
 
 @pytest.fixture(scope="module")
@@ -100,6 +102,38 @@ def test_common_parameters_have_one_value_at_all_settings(runs):
     assert len(found.result.parameters) == 5  # three rebound rates, one compression rate, the offset of the load cell
     rates = [float(get(law, "compression_rate")) for law in found.law.laws]
     assert rates == [rates[0]] * 3 and rates[0] == pytest.approx(600.0, rel=0.01)
+
+
+@pytest.mark.parametrize("common", [(), ("rebound_rate",), ("compression_rate",)])
+@pytest.mark.parametrize("rig", [None, "offset"])
+def test_tied_parameters_have_one_value_at_each_setting(runs, rig, common):
+    inside = "law." if rig else ""
+    tie = {f"{inside}compression_rate": f"{inside}rebound_rate"}
+    found = identify.fit_scheduled(Bilinear, runs, tie=tie, common=common, rig=rig, starts=1)
+    sums = [
+        np.sum([[r.velocity @ r.force, r.velocity @ r.velocity] for r in at.runs], 0) for at in found.alone.values()
+    ]
+    rates = [force / square for force, square in ([np.sum(sums, 0)] * 3 if common else sums)]
+    for name in ("rebound_rate", "compression_rate"):
+        assert [float(get(law, name)) for law in found.law.laws] == pytest.approx(rates, rel=1e-3)
+    assert len(found.result.parameters) == len(set(rates)) + bool(rig)
+
+
+def test_a_common_force_of_the_machine_is_tied_once(runs):
+    some = [run for run in runs if run.command != 2.0]
+    start, how = Linear(1000.0) + Spring(0.0, 1.0), {"rig": Rig(force_offset=1.0), "freeze": ["stiffness"], "starts": 1}
+    found = identify.fit_scheduled(start, some, tie={"force_offset": "preload"}, **how)
+    assert found.result.rig is not None
+    offset = float(found.result.rig.force_offset)
+    assert [float(get(law, "terms.1.preload")) for law in found.law.laws] == [offset] * 2
+    assert 2.0 * offset == pytest.approx(np.mean([run.force for run in some]), rel=0.01)
+
+
+def test_a_comparison_counts_tied_numbers_once(runs):
+    some, tie = [run for run in runs if run.command != 1.0], {"compression_rate": "rebound_rate"}
+    tied, linear = identify.compare({"tied": Bilinear, "linear": Linear}, some, scheduled=True, tie=tie).rungs
+    assert tied.parameters == linear.parameters == 3  # two rates, the offset of the load cell
+    assert tied.rmse == pytest.approx(linear.rmse, rel=1e-6)
 
 
 @pytest.mark.slow

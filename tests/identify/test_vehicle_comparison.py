@@ -83,6 +83,13 @@ def test_drives_given_are_predicted_and_one_drive_is_divided_in_time():
     assert by_others.best.held_out_rmse == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.slow
+def test_vehicles_are_judged_on_the_same_parts_if_only_some_have_numbers_of_one_drive():
+    forms, rides = {name: start()[name] for name in ("none", "coulomb")}, drives(CoulombFriction(60.0, 0.01), count=3)
+    found = identify.compare(forms, rides, dt=5e-3, per_record=["friction_force"], **FREE)
+    assert [len(rung.errors) for rung in found.rungs] == [12, 12] and found.best.name == "coulomb"
+
+
 def test_the_form_stands_where_the_friction_is_and_starts_from_it():
     def laws(ladder, of):
         return {name: of(car) for name, car in ladder.items()}

@@ -1,7 +1,7 @@
 /* FMI 2.0, model exchange and co-simulation, of a damper law, a vehicle or a controller. It stands behind the printed
- * functions `model_...`, behind law.c, vehicle.c or controller.c, which define PAIRS, RATES, OUTPUTS, STATES, CARRY,
- * MATRICES, RATES_GIVEN, prepare, start, resume, advance, observe and observe_derivative; GUID is a text. What computes
- * nothing is in services.c.
+ * functions `model_...`, behind checks.c, and behind law.c, vehicle.c or controller.c, which define PAIRS, RATES,
+ * OUTPUTS, STATES, CARRY, MATRICES, RATES_GIVEN, prepare, start, resume, advance, observe and observe_derivative; GUID
+ * is a text. What computes nothing is in services.c.
  *
  * Inputs come in pairs of a value and its rate: first all values, then all rates; those of a controller have no rates.
  * The carry of a run begins with the continuous states. Models with a PERIOD are sampled: for co-simulation only, and
@@ -19,7 +19,6 @@
 #include "fmi2Functions.h"
 
 #define INPUTS (PAIRS + RATES)
-#define NUMBERS (sizeof(model_parameters) / sizeof(double))
 enum { FIRST_OUTPUT = INPUTS, LONGEST_STEP = INPUTS + OUTPUTS, FIRST_NUMBER };
 #define FIRST_STATE (FIRST_NUMBER + NUMBERS)
 #define FIRST_RATE (FIRST_STATE + STATES)
@@ -45,7 +44,9 @@ typedef struct {
     int steps;                      /* the number of steps done, up to two */
     int started;                    /* initialisation is over */
     int changed;                    /* parameters have changed since `matrices` was computed */
-    int known;                      /* `end` and `used` are up to date */
+    int unchecked;                  /* numbers have changed since conditions between them were checked */
+    int known;                      /* `end`, `used`, `rate` and `y` are up to date */
+    double rate[STATES + 1], y[OUTPUTS]; /* of the states, and the outputs */
 } Model;
 
 static void set_defaults(Model *m, const fmi2CallbackFunctions *functions) {
@@ -115,7 +116,30 @@ static void refresh(Model *m) {
     if (!m->started) start(&m->p, m->matrices, m->input, m->carry);
     memcpy(m->end, m->carry, sizeof m->end);
     if (m->h > 0.0) advance(&m->before, &m->p, m->matrices, u0, m->used, m->h, n, m->end);
+    observe(&m->p, m->matrices, m->end, m->used, m->rate, m->y);
     m->known = 1;
+}
+
+static fmi2Status refused(const Model *m, fmi2String why) {
+    if (m->functions && m->functions->logger)
+        m->functions->logger(m->functions->componentEnvironment, "model", fmi2Error, "logStatusError", why);
+    return fmi2Error;
+}
+
+static fmi2Status lost(const Model *m, fmi2String what) {
+    char why[TEXT];
+    snprintf(why, TEXT, "%s is not a finite number. Inputs must be finite; laws steeper or wheels lighter than those "
+             "exported need a longest_step shorter than %g s.", what, m->longest);
+    return refused(m, why);
+}
+
+/* As `refresh`, if the numbers are allowed together. */
+static fmi2Status computed(Model *m) {
+    char why[TEXT];
+    if (m->unchecked && is_inconsistent(&m->p, why)) return refused(m, why);
+    m->unchecked = 0;
+    refresh(m);
+    return fmi2OK;
 }
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
@@ -131,7 +155,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 void fmi2FreeInstance(fmi2Component c) { free(c); }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
-    refresh((Model *)c);
+    if (computed((Model *)c) != fmi2OK) return fmi2Error;
     ((Model *)c)->started = 1;
     return fmi2OK;
 }
@@ -143,40 +167,42 @@ fmi2Status fmi2Reset(fmi2Component c) {
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
     Model *m = (Model *)c;
-    double rate[STATES + 1], y[OUTPUTS];
     size_t i;
-    refresh(m);
-    observe(&m->p, m->matrices, m->end, m->used, rate, y);
     for (i = 0; i < n; ++i) {
         const size_t k = vr[i];
+        const int given = k < FIRST_OUTPUT || (k >= LONGEST_STEP && k < FIRST_STATE);
+        if (!given && computed(m) != fmi2OK) return fmi2Error;
         if (k < FIRST_OUTPUT) value[i] = m->guessed[k] ? m->input0[k] : m->input[k];
-        else if (k < LONGEST_STEP) value[i] = y[k - FIRST_OUTPUT];
+        else if (k < LONGEST_STEP) value[i] = m->y[k - FIRST_OUTPUT];
         else if (k == LONGEST_STEP) value[i] = m->longest;
         else if (k < FIRST_STATE) value[i] = ((const double *)&m->p)[k - FIRST_NUMBER];
         else if (k < FIRST_RATE) value[i] = m->end[k - FIRST_STATE];
-        else if (k < FIRST_RATE + STATES) value[i] = rate[k - FIRST_RATE];
+        else if (k < FIRST_RATE + STATES) value[i] = m->rate[k - FIRST_RATE];
         else return fmi2Error;
+        /* solvers of model exchange try states without outputs */
+        if (!given && k < LONGEST_STEP && m->h > 0.0 && !is_number(value[i]))
+            return lost(m, model_output_names[k - FIRST_OUTPUT]);
     }
     return fmi2OK;
 }
 
-static fmi2Status refused(const Model *m, fmi2String why) {
-    if (m->functions && m->functions->logger)
-        m->functions->logger(m->functions->componentEnvironment, "model", fmi2Error, "logStatusError", why);
-    return fmi2Error;
-}
-
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {
     Model *m = (Model *)c;
+    char why[TEXT];
     size_t i;
+    m->known = 0;
     for (i = 0; i < n; ++i) {
         const size_t k = vr[i];
         if (k < FIRST_OUTPUT) {
             m->input[k] = value[i];
             m->guessed[k] = m->given[k] = 0;
             if (k >= PAIRS && value[i] != 0.0) m->rated[k - PAIRS] = 1;
-        } else if (k == LONGEST_STEP && value[i] > 0.0) {
+        } else if (k == LONGEST_STEP) {
             const double before = m->longest;
+            if (!(value[i] >= SHORTEST && is_number(value[i]))) {
+                snprintf(why, TEXT, "longest_step must be finite and at least %g s, but is %g.", SHORTEST, value[i]);
+                return refused(m, why);
+            }
             m->longest = value[i];
             if (m->h > 0.0 && !steps_in(m, m->carry, m->h)) {
                 m->longest = before;
@@ -184,13 +210,14 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
             }
         } else if (k >= FIRST_NUMBER && k < FIRST_STATE) {
             double *number = (double *)&m->p + (k - FIRST_NUMBER);
+            if (is_outside(k - FIRST_NUMBER, value[i], why)) return refused(m, why);
+            if (*number != value[i]) m->unchecked = 1;
             if (m->h <= 0.0 && *number != value[i]) m->changed = 1;
             *number = value[i];
         } else {
             return fmi2Error;
         }
     }
-    m->known = 0;
     return fmi2OK;
 }
 
@@ -222,7 +249,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
         else if (k >= FIRST_STATE && k < FIRST_RATE) dx[k - FIRST_STATE] += change[i];
         else return fmi2Error;
     }
-    refresh(m);
+    if (computed(m) != fmi2OK) return fmi2Error;
     observe_derivative(&m->p, &dp, m->end, dx, m->used, d, drate, dy);
     for (i = 0; i < n; ++i) {
         const size_t k = unknown[i];
@@ -236,27 +263,22 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
 /* ---- model exchange */
 
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n) {
-    if (n != STATES) return fmi2Error;
-    refresh((Model *)c);
+    if (n != STATES || computed((Model *)c) != fmi2OK) return fmi2Error;
     if (n) memcpy(((Model *)c)->carry, x, n * sizeof *x);
     ((Model *)c)->known = 0;
     return fmi2OK;
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t n) {
-    if (n != STATES) return fmi2Error;
-    refresh((Model *)c);
+    if (n != STATES || computed((Model *)c) != fmi2OK) return fmi2Error;
     if (n) memcpy(x, ((const Model *)c)->end, n * sizeof *x);
     return fmi2OK;
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real rates[], size_t n) {
     Model *m = (Model *)c;
-    double rate[STATES + 1], y[OUTPUTS];
-    if (n != STATES) return fmi2Error;
-    refresh(m);
-    observe(&m->p, m->matrices, m->end, m->used, rate, y);
-    if (n) memcpy(rates, rate, n * sizeof *rates);
+    if (n != STATES || computed(m) != fmi2OK) return fmi2Error;
+    if (n) memcpy(rates, m->rate, n * sizeof *rates);
     return fmi2OK;
 }
 
@@ -269,8 +291,7 @@ fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real nominal[]
     double carry[CARRY + 1], u0[INPUTS], u1[INPUTS];
     size_t i;
     int step, steps, k;
-    if (n != STATES) return fmi2Error;
-    refresh(m);
+    if (n != STATES || computed(m) != fmi2OK) return fmi2Error;
     steps = (int)ceil(0.5 / m->step);
     memcpy(carry, m->end, sizeof carry);
     memcpy(u1, m->input, sizeof u1);
@@ -328,7 +349,11 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real h, fmi2Boolean fi
         if (m->guessed[k]) m->input[k] = m->input0[k]; /* an input that was not set again keeps its value */
         m->known = m->known && !m->guessed[k];
     }
-    refresh(m);
+    if (computed(m) != fmi2OK) return fmi2Error;
+    for (k = 0; k < OUTPUTS; ++k)
+        if (!is_number(m->y[k])) return lost(m, model_output_names[k]);
+    for (k = 0; k < CARRY; ++k)
+        if (!is_number(m->end[k])) return lost(m, "A state");
     if (!steps_in(m, m->end, h))
         return refused(m, "The communication step cannot be divided so that samples and their commands lie between two "
                           "steps of the model: take the controller's period, a part or a multiple of it.");
