@@ -9,12 +9,12 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp.bench.motion import moving_span
+from jaxdamp.bench.peaks import at_peak, mean_where
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import as_runs
 
 
 STEADY = 0.1  # by which the stroke range of a steady cycle may differ from the median one
-NEAR_PEAK = 0.98  # of the peak velocity, beyond which samples count as taken at the peak
 
 
 class PeakVelocityPoints(NamedTuple):
@@ -103,8 +103,8 @@ def peak_velocity_points(runs: BenchRun | Iterable[BenchRun]) -> PeakVelocityPoi
     """Force at the compression and the rebound peak of the velocity, in the last steady cycle of each record.
 
     The points of a peak-velocity-pick-off (PVP) test. Each is the mean over the samples within 2 % of the peak, so that
-    one noisy sample decides nothing; a record without a full cycle is searched as a whole, and where it moves in one
-    direction only, the other point is NaN.
+    one noisy sample decides nothing, or over the central half of strokes at constant velocity; a record without a full
+    cycle is searched as a whole, and where it moves in one direction only, the other point is NaN.
 
     Arguments:
         runs: one record or several.
@@ -126,10 +126,9 @@ def peak_velocity_points(runs: BenchRun | Iterable[BenchRun]) -> PeakVelocityPoi
     rows = []
     for run in as_records(runs, "peak_velocity_points(runs)"):
         part = last_steady_cycle(run)
-        velocity, force = run.velocity[part], run.force[part]
-        peaks = (min(velocity.min(), 0.0), max(velocity.max(), 0.0))
-        at_peaks = [(velocity / peak >= NEAR_PEAK) if peak else np.zeros(len(velocity), bool) for peak in peaks]
-        rows.append([(velocity[at].mean(), force[at].mean()) if at.any() else (np.nan, np.nan) for at in at_peaks])
+        stroke, velocity, force = (values[None, part] for values in (run.stroke, run.velocity, run.force))
+        at_peaks = [at_peak(stroke, sign * velocity) for sign in (-1.0, 1.0)]
+        rows.append([(mean_where(velocity, at)[0], mean_where(force, at)[0]) for at in at_peaks])
     points = np.array(rows, dtype=float)
     return PeakVelocityPoints(points[..., 0], points[..., 1])
 

@@ -6,7 +6,8 @@ A difference of neighbouring samples multiplies noise of σ metres by √2 times
 * harmonic regression: a steady sine of a test bench is a few harmonics of one frequency. Frequency and harmonics are
   fitted to the whole record and differentiated exactly; noise, mains ripple and quantisation average out.
 * Savitzky-Golay: the slope of a cubic or quintic fitted around every sample. The window is the one with the least
-  expected error, judged by what in the spectrum of the record is motion (see `jaxdamp.bench.spectrum`).
+  expected error, judged by what in the spectrum of the record is motion (see `jaxdamp.bench.spectrum`). Of strokes at
+  constant velocity, as in a triangle, the slope of a parabola: a mean of the velocity, which overshoots at no corner.
 """
 
 import numpy as np
@@ -32,6 +33,8 @@ _STEADY = 0.004  # amplitude by which a cycle may differ from the mean cycle
 _UNSTEADY = 0.5  # the same, beyond which a look at some of the samples is enough
 _ENOUGH, _A_CYCLE = 20_000, 20  # samples, in all and in a cycle, of such a look
 _LAST_SHARE = 0.005  # of the highest harmonics in the velocity, relative to the fundamental
+_AT_REST = 0.1  # of the largest speed
+_CONSTANT = 0.85  # of the largest speed but a tenth of the samples, which half of the motion exceeds
 _QUIET = 0.03  # residual, relative to the amplitude, that is taken for ripple and noise of any colour
 
 
@@ -88,8 +91,11 @@ def estimate_velocity(time: ArrayLike, stroke: ArrayLike, *, method: str | None 
                 "'harmonic' for a stroke that is no steady periodic motion of two cycles or more",
                 "Cut rest and run-up away, or use 'savitzky-golay'.",
             )
-    window, order, gain = _window(spectrum, frequency)
+    window, order, gain = _window(spectrum, frequency, (3, 5))
     velocity = spectrum.rate * savitzky_golay(stroke, window, order, derivative=1)
+    if _is_mostly_constant(velocity):
+        window, order, gain = _window(spectrum, frequency, (2,))
+        velocity = spectrum.rate * savitzky_golay(stroke, window, order, derivative=1)
     width = f"{window} samples ({1e3 * (window - 1) / spectrum.rate:.3g} ms)"
     how = f"velocity from the stroke by a Savitzky-Golay filter of {width}, order {order}"
     return velocity, how + spectrum.left_out(gain / np.maximum(spectrum.omega, np.finfo(float).tiny))
@@ -204,15 +210,24 @@ def _in_cycles(t: Samples, residual: Samples, omega: float) -> tuple[Float[np.nd
     return (2 * np.hypot(cosine, sine) / np.maximum(count, 1))[full], int(count.max())
 
 
-def _window(spectrum: Spectrum, frequency: float) -> tuple[int, int, Float[np.ndarray, " lines"]]:
+def _is_mostly_constant(velocity: Samples) -> bool:
+    """Whether most of a motion, rest left out, has nearly its largest speed: that of a sine has 0.7 times of it."""
+    speed = np.abs(velocity)
+    moving = speed[speed > _AT_REST * speed.max()]
+    return bool(np.median(moving) > _CONSTANT * np.quantile(moving, 0.9))
+
+
+def _window(
+    spectrum: Spectrum, frequency: float, orders: tuple[int, ...]
+) -> tuple[int, int, Float[np.ndarray, " lines"]]:
     """Length and order of the Savitzky-Golay filter with the least expected error of the velocity, and its gain."""
     power, omega = spectrum.power, spectrum.omega
     motion = np.where(spectrum.motion, power - spectrum.floor, 0.0)
     longest = min(max(spectrum.rate / frequency, 5), 2 * (len(power) - 1) - 1)
-    best = (np.inf, 5, 3)
-    for order in (3, 5):
-        half = order // 2 + 1
-        while 2 * half + 1 <= longest or half == order // 2 + 1:
+    best = (np.inf, 5, orders[0])
+    for order in orders:
+        half = least = (order + 1) // 2
+        while 2 * half + 1 <= longest or half == least:
             response = _response(half, order, omega)
             error = float(np.sum(motion * (response - omega) ** 2 + (power - motion) * response**2))
             best = min(best, (error, 2 * half + 1, order))

@@ -57,7 +57,8 @@ class Noise(NamedTuple):
     def level(self) -> float:
         """Standard deviation of a sample with its memory, beside which priors count."""
         rows = np.concatenate(self.records)
-        return float(np.sqrt(self.variance * _mean_square(self.sigma[rows]) / _mean_square(self.by_sample[rows])))
+        shown, whole = _mean_square(self.by_sample[rows]), _mean_square(self.sigma[rows])
+        return float(np.sqrt(self.variance * (whole / shown if shown > 0 else 1.0)))
 
     def with_sigma(self, sigma: Float[np.ndarray, " samples"]) -> "Noise":
         """The same with these standard deviations, which contain the inflation."""

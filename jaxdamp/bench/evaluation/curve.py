@@ -9,8 +9,9 @@ from jaxtyping import Float
 
 from jaxdamp._display import plus_minus
 from jaxdamp._tables import Cell, Shown
-from jaxdamp.bench.analysis import NEAR_PEAK, FoldedCycles
+from jaxdamp.bench.analysis import FoldedCycles
 from jaxdamp.bench.contradictions import repeats
+from jaxdamp.bench.peaks import CENTRAL, Cycles, Figures, around_middle, at_peak, mean_where, speed_is_constant
 from jaxdamp.bench.runs import BenchRun
 
 
@@ -65,17 +66,14 @@ def measured(values: Float[np.ndarray, " values"]) -> tuple[float, float | None,
     return float(values.mean()), float(values.std(ddof=1)) if len(values) > 1 else None, len(values)
 
 
-CENTRAL = 0.1  # share of the stroke range that counts as mid-stroke
 TURNING = 0.05  # of the peak velocity, below which samples count as taken at zero velocity
-
-Cycles = Float[np.ndarray, "cycles points"]
-Figures = Float[np.ndarray, " cycles"]
 
 
 def cycle_figures(cycles: FoldedCycles) -> dict[tuple[str, str], Figures]:
     """The figures of each cycle by quantity and unit.
 
-    - force at peak velocity: mean over the samples within 2 % of the largest velocity of that direction;
+    - force at peak velocity: mean over the samples within 2 % of the largest velocity of that direction; in strokes at
+      constant velocity, as of a triangle, over the central half of the stroke;
     - force at mid-stroke: mean over the central 10 % of the stroke range;
     - rebound/compression ratio: of the magnitudes of the forces at peak velocity;
     - static force: at zero velocity, mean of both ends of the stroke;
@@ -85,25 +83,22 @@ def cycle_figures(cycles: FoldedCycles) -> dict[tuple[str, str], Figures]:
       so that a spring (gas) of rate k adds 2 k X.
     """
     stroke, velocity, force = cycles.stroke, cycles.velocity, cycles.force
-    highest, lowest = velocity.max(axis=1, keepdims=True), velocity.min(axis=1, keepdims=True)
-    rebound = (velocity >= NEAR_PEAK * highest) & (highest > 0)  # near the largest velocity of the direction
-    compression = (velocity <= NEAR_PEAK * lowest) & (lowest < 0)
-    forces = _mean_where(force, rebound), _mean_where(force, compression)
-    span = np.ptp(stroke, axis=1, keepdims=True)
+    rebound, compression = (at_peak(stroke, sign * velocity) for sign in (1.0, -1.0))
+    forces = mean_where(force, rebound), mean_where(force, compression)
     middle = 0.5 * (stroke.max(axis=1, keepdims=True) + stroke.min(axis=1, keepdims=True))
-    central = np.abs(stroke - middle) <= 0.5 * CENTRAL * span
+    central = around_middle(stroke, CENTRAL)
     turning = np.abs(velocity) <= TURNING * np.abs(velocity).max(axis=1, keepdims=True)
     energy = np.mean(force * velocity, axis=1) * cycles.periods
     squared = np.mean(velocity**2, axis=1) * cycles.periods
-    ends = [_mean_where(force, turning & side) for side in (stroke > middle, stroke < middle)]
+    ends = [mean_where(force, turning & side) for side in (stroke > middle, stroke < middle)]
     return {
-        ("rebound velocity", "m/s"): _mean_where(velocity, rebound),
+        ("rebound velocity", "m/s"): mean_where(velocity, rebound),
         ("rebound force", "N"): forces[0],
-        ("compression velocity", "m/s"): _mean_where(velocity, compression),
+        ("compression velocity", "m/s"): mean_where(velocity, compression),
         ("compression force", "N"): forces[1],
         ("rebound/compression ratio", ""): np.abs(forces[0] / forces[1]),
-        ("mid-stroke rebound force", "N"): _mean_where(force, central & (velocity > 0)),
-        ("mid-stroke compression force", "N"): _mean_where(force, central & (velocity < 0)),
+        ("mid-stroke rebound force", "N"): mean_where(force, central & (velocity > 0)),
+        ("mid-stroke compression force", "N"): mean_where(force, central & (velocity < 0)),
         ("mean force", "N"): force.mean(axis=1),
         ("static force", "N"): 0.5 * (ends[0] + ends[1]),
         ("energy per cycle", "J"): energy,
@@ -111,13 +106,6 @@ def cycle_figures(cycles: FoldedCycles) -> dict[tuple[str, str], Figures]:
         ("hysteresis area", "W"): -_loop_integral(force, velocity),
         ("hysteresis width", "N"): ends[0] - ends[1],
     }
-
-
-def _mean_where(values: Cycles, where: np.ndarray) -> Figures:
-    """Mean of each cycle over some of its samples; NaN where there is none."""
-    count = where.sum(axis=1)
-    sums = np.where(where, values, 0.0).sum(axis=1)
-    return np.divide(sums, count, out=np.full(len(values), np.nan), where=count > 0)
 
 
 def _loop_integral(force: Cycles, velocity: Cycles) -> Figures:
@@ -177,15 +165,17 @@ def on_loop(cycles: FoldedCycles, sign: float, velocity: float, window: float) -
     """Force at a velocity on the continuous loop, mean of its accelerating and its decelerating branch.
 
     Each branch is fitted by a straight line over the velocities within a share of the stated one. NaN where the
-    record does not reach it.
+    record does not reach it, or has it only in turns between strokes at constant velocity.
     """
     directed = sign * cycles.velocity
+    slower = velocity < (1.0 - window) * np.median(directed[directed > 0])
+    only_in_turns = speed_is_constant(cycles.stroke, directed) & slower
     branches = np.gradient(directed, axis=1) > 0
     forces = [
         0.5 * sum(_force_at(v[branch], f[branch], velocity, window) for branch in (accelerating, ~accelerating))
         for v, f, accelerating in zip(directed, cycles.force, branches, strict=True)
     ]
-    return measured(np.array(forces))
+    return measured(np.where(only_in_turns, np.nan, forces))
 
 
 def _force_at(velocity: Cycle, force: Cycle, at: float, window: float) -> float:
@@ -210,6 +200,7 @@ def rates_and_knees(cycles: FoldedCycles, setting: str, record: str) -> list[Mea
     for name, sign in DIRECTIONS.items():
         each = zip(cycles.stroke, cycles.velocity, cycles.force, strict=True)
         rows = np.array([_bend(*cycle, sign) for cycle in each])
+        rows[speed_is_constant(cycles.stroke, sign * cycles.velocity)] = np.nan  # one velocity has no slope
         quantities = (f"{name} rate", f"{name} low-speed rate", f"{name} high-speed rate", f"{name} knee velocity")
         for quantity, column in zip(quantities, rows.T, strict=True):
             if np.isfinite(column).mean() >= 0.5:
@@ -326,14 +317,20 @@ def _peak_forces(runs: Sequence[BenchRun], of_records: Sequence[Measurement], di
 
 
 def span(
-    settings: Mapping[str, Sequence[BenchRun]], measurements: Sequence[Measurement], method: str
+    settings: Mapping[str, Sequence[BenchRun]],
+    cycles: Mapping[str, FoldedCycles],
+    measurements: Sequence[Measurement],
+    method: str,
 ) -> tuple[float, float, str]:
     """The lowest and highest velocity at which the records of all settings give a force, equal if at none; in words."""
     peaks = [points for name, runs in settings.items() for points in _peaks_of(name, runs, measurements).values()]
     spans = [[point.velocity for point in points] for points in peaks if points]
     low, high = max(map(min, spans), default=0.0), min(map(max, spans), default=0.0)
-    low = 0.0 if method == "loop" else low
-    words = f"the records give forces from {low:.3g} to {high:.3g} m/s" if low < high else "the records enclose none"
+    loops = [cycles[fastest(runs).name] for runs in settings.values()] if method == "loop" else []
+    if loops and not any(speed_is_constant(loop.stroke, loop.velocity).any() for loop in loops):
+        low = 0.0  # a loop goes through all velocities
+    at = f"the records give forces at {high:.3g} m/s" if method == "loop" else "the records enclose none"
+    words = f"the records give forces from {low:.3g} to {high:.3g} m/s" if low < high else at
     return low, max(low, high), words
 
 

@@ -179,11 +179,11 @@ def _not_reached(
     missed = [v for v in velocities or () if v not in reached]
     if not missed and (velocities is not None or reached):
         return [], []
-    low, high, where = span(settings, measurements, method)
+    low, high, where = span(settings, cycles, measurements, method)
     if velocities is not None:
         return [f"No force at {v:.4g} m/s: {where}." for v in missed], []
     found, instead = list[Measurement](), "Add records of other velocities."
-    if low < high:
+    if low < high or method == "loop":
         digits = 1 - int(np.floor(np.log10(high)))
         velocity = max(float(np.floor(high * 10.0**digits) / 10.0**digits), low)
         instead = f"Forces are stated at {velocity:.4g} m/s."

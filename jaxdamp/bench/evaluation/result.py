@@ -176,7 +176,7 @@ class Evaluation(AbstractResult):
             missing = [velocity for velocity in wanted if not any(at_velocity(m, velocity) for m in own)]
             more = forces_at(missing, name, runs, self.cycles, self.measurements, self.method, self.window)
             found = (*found, *more)
-        return LimitCheck.of(found, limits, span(self.settings, self.measurements, self.method)[2])
+        return LimitCheck.of(found, limits, span(self.settings, self.cycles, self.measurements, self.method)[2])
 
     def content(self) -> Contents:
         """All measurements as plain data."""
