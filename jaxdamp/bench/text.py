@@ -12,6 +12,7 @@ from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
 from jaxdamp._files import check_size
 from jaxdamp.bench.blocks import blocks_of, named_apart, title
+from jaxdamp.bench.headers import role_of
 from jaxdamp.bench.layout import (
     DELIMITERS,
     GROUPED,
@@ -19,6 +20,7 @@ from jaxdamp.bench.layout import (
     PLAINLY,
     Header,
     Layout,
+    Rows,
     columns_of,
     header_of,
     is_number,
@@ -31,6 +33,7 @@ from jaxdamp.bench.raw import RawColumn, RawTable
 _LOOK_AT = 2000  # lines that decide on the delimiter
 _MOST_COLUMNS = 4096  # of a text file
 _CHUNK = 5_000  # lines that are divided at a time, to bound the memory
+_WHOLE = re.compile(r"[+-]?\d+")
 _MINUS = re.compile(r"(?<![A-DF-Za-df-z])\u2212(?=[\d.,])")  # as spreadsheets write it; not that of "s−1"
 _CONTENT = {  # how files of other formats begin
     b"PK\x03\x04": "an XLSX workbook (.xlsx)",
@@ -67,6 +70,7 @@ def read_text(file: Path, delimiter: str | None = None) -> list[RawTable]:
     header = header_of(rows, layout)
     if header is None:
         raise ValueError(f"{file}: no row has a number in each of its {layout.count} columns: mend or shorten it.")
+    _check_commas(file, rows, header, layout)
     first = rows[header.first][0]
     above = rows[header.top][0]
     head = lines[above - 1]
@@ -78,6 +82,21 @@ def read_text(file: Path, delimiter: str | None = None) -> list[RawTable]:
         table = _table(file, lines[: block.end], block.first, layout, header)
         tables.append(replace(table, preamble=preamble, record=title(preamble, block, block.header, layout)))
     return named_apart(tables, "")
+
+
+def _check_commas(file: Path, rows: Rows, header: Header, layout: Layout) -> None:
+    """Refuse whole numbers between commas under fewer names: the commas may be decimal signs as well."""
+    if layout.delimiter != "," or any(header.names):
+        return
+    named = ((n, row) for n, row in reversed(rows[: header.first]) if any(map(role_of, row)))
+    line, names = next(named, (0, []))
+    whole = all(_WHOLE.fullmatch(cell) for _, row in rows[header.first :] if layout.values_in(row) for cell in row)
+    if len(names) < layout.count <= 2 * len(names) and not any(map(layout.has_value, names)) and whole:
+        raise ValueError(
+            f"{file}: line {line} has {len(names)} names, and the rows below have {layout.count} whole numbers: "
+            "decimal commas and commas between the columns cannot be told apart. Export the file with semicolons "
+            "between the columns or with decimal points; if the numbers are whole, name every column."
+        )
 
 
 def _table(file: Path, lines: list[str], first: int, layout: Layout, header: Header) -> RawTable:

@@ -33,7 +33,8 @@ def bench_command(
     limit is not kept.
 
     Arguments:
-        limits: CSV of limits: quantity, minimum, maximum, velocity, setting, record.
+        limits: CSV of limits: quantity, minimum, maximum, velocity, setting, record; compression and gas forces
+            are negative.
         baseline: to compare with: a law as JSON, or other records, read the same way.
     """
     reading.processing()

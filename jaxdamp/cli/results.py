@@ -42,6 +42,7 @@ class Results:
         self.target, self._command, self._earlier = target, command, earlier
         self._published = begun or {}  # hashes by file
         self._begun = begun is not None  # what is in the folder is of this very run
+        self._made: set[str] = set()  # names of what this process has written, unlike what it resumes
         self.missing = "everything"
         self.draft = self._new_draft()
 
@@ -66,6 +67,7 @@ class Results:
             for name in fresh:
                 sync(self.draft / name)
             own = set(self._published)
+            self._made.update(fresh)
             self._published |= {name: resuming.sha256(self.draft / name) for name in fresh}
             if not self.target.exists():
                 self._tell(self.draft, missing)
@@ -89,9 +91,17 @@ class Results:
         self._tell(self.target, missing or moved)
         for name in fresh:
             os.replace(self.draft / name, own_place(self.target, name, self._keep, replace=name in own))
+        if not missing:
+            self._drop_outdated()
         self._tell(self.target, missing)
         if not missing:
             (self.target / UNFINISHED).unlink(missing_ok=True)
+
+    def _drop_outdated(self) -> None:
+        """Remove what the interrupted run wrote and the resumed one did not, such as files of a law now surpassed."""
+        outdated = sorted(self._published.keys() - self._made)
+        _remove_unchanged(self.target, {"files": outdated, "sha256": self._published, "complete": True})
+        self._published = {name: was for name, was in self._published.items() if name in self._made}
 
     def _keep_previous(self, fresh: list[str]) -> None:
         """Move what an earlier run wrote, and files of the names to come, to `.previous`; the one before is dropped."""
@@ -100,7 +110,7 @@ class Results:
         if not there:
             return
         previous, old = self.target / PREVIOUS, self.target / MANIFEST
-        _forget(previous)
+        _remove_unchanged(previous, _manifest(previous))
         previous.mkdir(exist_ok=True)
         if old.is_file():
             shutil.copyfile(old, previous / MANIFEST)
@@ -314,11 +324,11 @@ def _inside(folder: Path, name: str) -> bool:
     return path.resolve().is_relative_to(folder.resolve()) and not path.is_symlink()
 
 
-def _forget(previous: Path) -> None:
-    """Delete the results before the last ones, but for files that somebody changed since or put there."""
-    for name in _unchanged(previous, _manifest(previous)):
-        (previous / name).unlink()
-        _remove_empty((previous / name).parent, previous)
+def _remove_unchanged(folder: Path, manifest: Contents) -> None:
+    """Delete the files of a manifest, but for those that somebody changed since or put there."""
+    for name in _unchanged(folder, manifest):
+        (folder / name).unlink()
+        _remove_empty((folder / name).parent, folder)
 
 
 def _remove_empty(folder: Path, root: Path) -> None:

@@ -29,7 +29,7 @@ CLEARLY = 0.7  # of the squares left without it: friction that leaves less is na
 SURE = 6.0  # standard errors from which an effect is named
 NOTICEABLE = 0.01  # sampling intervals of a delay, and tenths of a channel, below which an effect does not matter
 REVERSED = -0.3  # correlation of a channel with its prediction below which its sign is doubted
-POORLY = 30.0  # fit [%] of a channel below which the vehicle of the start is asked too
+POORLY = 30.0  # fit [%] of a channel of a record below which the vehicle of the start is asked too
 ANOTHER_UNIT = 4.0  # times a channel of the vehicle of the start, whose numbers are within a factor of two
 ALIKE = 0.7  # correlation from which a channel is the one of the vehicle, in another unit
 OF_ITS_OWN = 1e-3  # share of an effect that no fitted number has, below which it cannot be shown
@@ -38,15 +38,19 @@ OF_ITS_OWN = 1e-3  # share of an effect that no fitted number has, below which i
 def on_signs(scores: Sequence[ChannelScore], at_start: Sequence[ChannelScore]) -> list[str]:
     """A sentence on each channel that the vehicle predicts with the other sign.
 
-    A fit may bend the vehicle until a reversed channel runs with it a little, and explain it badly all the same: then
-    the vehicle that the fit started from tells.
+    A fit may bend the vehicle until a reversed channel runs with it, and others of the record against it. So where it
+    explains any of them badly, the vehicle that it started from is asked about all, and a channel that runs with that
+    one is right if another runs against it.
     """
     notes = []
+    poor = {score.record for score in scores if score.fit_percent < POORLY}
+    told = {first.record for first in at_start if first.correlation < REVERSED}
     for score, first in zip(scores, at_start, strict=True):
         which, against = "fitted vehicle", score.correlation
-        if score.fit_percent < POORLY:
+        if score.record in poor:
             which, against = min((which, against), ("vehicle of the start", first.correlation), key=lambda one: one[1])
-        if against < REVERSED:
+        right = score.record in poor & told and first.correlation > -REVERSED
+        if against < REVERSED and not right:
             notes.append(
                 f"{score.channel} of {score.record} runs against the {which} (correlation {against:.2f}): its sign, or"
                 " that of the other channels, is reversed. Accelerations and heights count positive up, travels in"

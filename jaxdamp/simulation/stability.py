@@ -20,6 +20,7 @@ from jaxdamp.vehicles import AbstractVehicle, System
 
 
 LARGEST = 0.5  # of the share below; the corrected step is stable up to 1
+STIFF = 0.1  # of the share through the travel alone, from which on two steps are taken: they err a fifth as much
 MOST = 64
 HEUN = 1.0  # largest rate of a state times the step for the explicit step of slow states, which is stable up to 2
 _VELOCITIES = np.concatenate([-np.geomspace(3.0, 1e-4, 14), [0.0], np.geomspace(1e-4, 3.0, 14)])  # m/s
@@ -165,7 +166,8 @@ def step_need(system: System, slopes: Sequence[Slopes], dt: float, *, most: int 
     1/m = P M⁻¹ Pᵀ. The steepest slopes count, such as that of friction at standstill, and k also through the states:
     a law in which a fast state follows the travel is a spring over a short step, whatever its own step makes of it.
     Laws whose states are extrapolated, such as a lag much shorter than the step, count twice. Slow states, carried on
-    by the explicit step of `AbstractStateful`, also need a step shorter than their time constant.
+    by the explicit step of `AbstractStateful`, also need a step shorter than their time constant. A law that is
+    nearly a stiff spring over the step, such as compressible oil, takes two steps for the sake of accuracy.
 
     Raises:
         ValueError: more than `most` would be needed.
@@ -182,6 +184,7 @@ def step_need(system: System, slopes: Sequence[Slopes], dt: float, *, most: int 
     count, worst = max(1, math.ceil(min(float(counts.max()), 1e9))), int(counts.argmax())
     if count > most:
         _refuse_law(system.layout.ports[worst], slopes[worst], dt, count)
+    count = max(count, 1 + bool(by_travel.max() > STIFF))
     return Need(count, float(by_travel.max()), float(by_contact.max()))
 
 

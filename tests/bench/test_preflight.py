@@ -158,6 +158,17 @@ def test_magnitudes_that_no_damper_test_has():
 # ---- records beside one another
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("force", [100.0, 0.1, 0.0])
+def test_a_force_that_never_changes_is_an_error_without_warnings(force):
+    time = np.arange(1000) / 500
+    run = BenchRun.from_arrays("level", time, 0.02 * np.sin(4 * np.pi * time), np.full(1000, force))
+    found = preflight(run)
+    assert [finding.message for finding in found.findings if finding.severity == "error"] == [
+        f"the force stays at {force:.3g} N for 2 s while the stroke moves"
+    ]
+
+
 def test_mixed_settings_and_a_turned_record():
     test = [SineTest(0.02, f, cycles=4) for f in (1.0, 1.1, 1.2)]
     runs = list(VirtualDyno(LAWS["bilinear"], **SENSORS).run(test))

@@ -142,6 +142,22 @@ def test_two_decimal_signs_are_refused(write):
         read(write(header="t_s;x_mm;F_N", delimiter=";", replace={9: "0.03;1,234.5;3.5"}))
 
 
+@pytest.mark.parametrize("units", ["", "ms,mm,N\n"])
+@pytest.mark.parametrize("count", [4, 5, 6])
+def test_decimal_commas_between_commas_are_refused(tmp_path, units, count):
+    rows = "".join(",".join(["2,0,-251,6,283,007".split(",")[i] for i in range(count)]) + "\n" for _ in range(30))
+    (tmp_path / "a.csv").write_text(f"rig 7,\nt,stroke,force\n{units}{rows}")
+    with pytest.raises(ValueError, match=rf"line 2 has 3 names, .* {count} whole .*cannot be told apart.*semicolons"):
+        read(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize(("head", "rows"), [("", "1,2,3\n"), ("front,rear\n", "1,2,3\n"), ("t,F\n", "1,2.5,3\n")])
+def test_whole_numbers_that_no_names_explain_have_columns_by_number(tmp_path, head, rows):
+    (tmp_path / "a.csv").write_text(head + 30 * rows)
+    with pytest.raises(ValueError, match=r"has no header row.*columns="):
+        read(tmp_path / "a.csv")
+
+
 def test_commas_that_may_divide_thousands_are_refused(tmp_path):
     rows = [f"{i};{i % 20};{1000 + i:,}" for i in range(1, 60)]
     (tmp_path / "a.csv").write_text("\n".join(["t_ms;x_mm;F_N", *rows]))

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from jaxdamp.cli import resuming
 from jaxdamp.cli.interrupt import Interrupted
 from jaxdamp.cli.results import results_folder, written
 
@@ -79,6 +80,26 @@ def test_the_note_that_something_is_missing_goes_at_the_end(tmp_path: Path) -> N
     assert results.published == ["law.json", "picture.png"]
     manifest = json.loads((target / "manifest.json").read_text())
     assert manifest["complete"] and manifest["files"] == ["law.json", "picture.png", "manifest.json"]
+
+
+def test_a_resumed_run_drops_what_it_did_not_write_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    target, old = tmp_path / "out", ["law.json", "bilinear.csv", "settings/bilinear.csv", "notes.csv"]
+    with pytest.raises(RuntimeError), results_folder(target, "test") as results:
+        _fill(results.draft, *old)
+        results.publish("the pictures")
+        raise RuntimeError
+    monkeypatch.setattr(resuming, "kept", lambda folder: 1)
+    with results_folder(target, "test", resume=True) as results:
+        _fill(results.draft, "law.json")
+        results.publish("the pictures")
+        assert {*old} <= {*written(target)}  # they may still come
+        (target / "notes.csv").write_text("mine")
+        _fill(results.draft, "picture.png")
+    assert written(target) == ["law.json", "manifest.json", "notes.csv", "picture.png"]
+    assert not (target / "settings").exists() and results.published == ["law.json", "picture.png"]
+    manifest = json.loads((target / "manifest.json").read_text())
+    assert manifest["complete"] and manifest["files"] == ["law.json", "picture.png", "manifest.json"]
+    assert manifest["sha256"].keys() == {"law.json", "picture.png"}
 
 
 def test_an_interruption_keeps_what_is_finished(tmp_path: Path) -> None:

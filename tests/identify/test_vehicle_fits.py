@@ -13,6 +13,7 @@ from jaxdamp.dampers import Bilinear, CoulombFriction, Linear
 from jaxdamp.identify import vehicle_residuals
 from jaxdamp.identify.model import VehicleTest
 from jaxdamp.identify.problem import linearised
+from jaxdamp.identify.vehicle_left_out import on_signs
 from jaxdamp.identify.vehicle_preparing import drives_of, frozen_paths, per_record_paths, vehicle_test
 from jaxdamp.identify.vehicle_residuals import ride_batches
 from jaxdamp.parameters import free_parameters, parameters, replace
@@ -263,9 +264,21 @@ def test_a_reversed_channel_is_named(record, reversed_channel):
     channels = dict(record.channels) | {reversed_channel: -record[reversed_channel]}
     wrong_sign = dataclasses.replace(record, channels=channels)
     result = identify.fit(START, wrong_sign, over=FREE, freeze=["sprung_mass"], sensors=ZERO, dt=2e-3)
-    assert re.search(
-        r"of sweep runs against the (fitted vehicle|vehicle of the start) \(correlation -0", " ".join(result.warnings)
-    )
+    against = r"(fitted vehicle|vehicle of the start) \(correlation -0"
+    assert re.search(rf"{reversed_channel} of sweep runs against the {against}", " ".join(result.warnings))
+
+
+def test_of_two_channels_that_run_against_each_other_the_start_tells_the_wrong_one():
+    """A fit to a reversed stroke bends the car, so that the acceleration, which is right, runs against it."""
+
+    def scores(*pairs: tuple[float, float]) -> list[identify.ChannelScore]:
+        each = zip(("sprung_acceleration", "stroke"), pairs, strict=True)
+        return [identify.ChannelScore("sweep", name, "", 1.0, percent, 1.0, alike) for name, (percent, alike) in each]
+
+    (note,) = on_signs(scores((0.0, -0.64), (43.5, 0.8)), scores((20.0, 0.61), (0.0, -0.77)))
+    assert note.startswith("stroke of sweep runs against the vehicle of the start (correlation -0.77)")
+    (unsure,) = on_signs(scores((0.0, -0.64), (43.5, 0.8)), scores((0.0, 0.1), (0.0, 0.2)))
+    assert unsure.startswith("sprung_acceleration of sweep runs against the fitted vehicle")
 
 
 @pytest.mark.slow

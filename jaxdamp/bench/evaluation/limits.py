@@ -50,10 +50,19 @@ UNITS = {
     }.items()
 }  # of each quantity that an evaluation may hold
 
+_STATIC = ("gas force", "static force")  # mostly negative, but an offset of the load cell may turn them
+_SIGNS = dict.fromkeys(_STATIC, -1.0) | {
+    quantity: sign
+    for name, sign in DIRECTIONS.items()
+    for quantity in (f"{name} force", f"mid-stroke {name} force", f"{name} velocity")
+}  # that quantities usually have, as the library counts
+
 
 @dataclass(frozen=True)
 class Limit:
     """The least and the largest value that a quantity may have, with the library's signs and in SI.
+
+    Compression and gas forces are negative: at most 400 N in compression is `minimum=-400.0`.
 
     Arguments:
         quantity: such as "rebound force" or "gas force".
@@ -93,6 +102,20 @@ class Limit:
         low = self.minimum is None or value >= self.minimum
         return bool(np.isfinite(value)) and low and (self.maximum is None or value <= self.maximum)
 
+    def _is_turned(self, value: float) -> bool:
+        """Whether a value has the usual sign of its quantity, and every bound the other one."""
+        sign = _SIGNS.get(self.quantity, 0.0)
+        bounds = [bound for bound in (self.minimum, self.maximum) if bound is not None]
+        return sign * value > 0.0 and all(sign * bound < 0.0 for bound in bounds)
+
+    def _remedy(self) -> str:
+        """How it is written with the usual sign of its quantity."""
+        unit, word = UNITS[self.quantity], "positive" if _SIGNS[self.quantity] > 0.0 else "negative"
+        turned = {"minimum": self.maximum, "maximum": self.minimum}
+        bounds = (f"{name} {-bound:g} {unit}" for name, bound in turned.items() if bound is not None)
+        other = "" if None not in turned.values() else ", or give both bounds"
+        return f"A {self.quantity} counts {word}: write {' and '.join(bounds)}{other}"
+
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
@@ -119,6 +142,7 @@ class LimitCheck(AbstractResult):
                 if near:
                     hint = f"Did you mean {near!r}?"
                     _checks.refuse("limits", "name quantities that are measured", repr(limit.quantity), hint)
+            _refuse_turned(limit, [m.value for m in mine if np.isfinite(m.value)])
             results += [(limit, m) for m in mine] or [(limit, None)]
         if not results:
             _checks.refuse("limits", "hold at least one limit", "empty")
@@ -131,21 +155,25 @@ class LimitCheck(AbstractResult):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """The limits that are not kept, or whose quantity was not measured."""
+        """The limits that are not kept, whose quantity was not measured, or whose sign is not that of the values."""
         said = []
-        for row in self.table().records():
-            if row["verdict"] != "passed":
+        for (limit, m), row in zip(self.results, self.table().records(), strict=True):
+            turned = m is not None and limit._is_turned(m.value)
+            if row["verdict"] != "passed" or turned:
                 at = "" if row["velocity"] is None else f" at {row['velocity']:.4g} m/s"
                 where = row["record"] or ("" if row["setting"] in ("", "*") else f"setting {row['setting']}")
                 of = f" of {where}" if where else ""
                 why = f": {self.reach}" if at and self.reach and row["verdict"] == "NOT MEASURED" else ""
+                if m is not None and turned:
+                    why = f"; the limit has another sign than the measured {m.value:.4g} {m.unit}. {limit._remedy()}"
                 said.append(f"{row['quantity']}{at}{of}: {row['verdict']}{why}.")
         return tuple(said)
 
     @property
     def summary(self) -> str:
         """How many limits are kept."""
-        return f"{len(self.results) - len(self.warnings)} of {len(self.results)} limits are kept."
+        kept = sum(m is not None and limit.kept_by(m.value) for limit, m in self.results)
+        return f"{kept} of {len(self.results)} limits are kept."
 
     plot = drawn_by("limit_check", "Each measured value between its limits.")
 
@@ -171,6 +199,19 @@ class LimitCheck(AbstractResult):
 
     def __repr__(self) -> str:
         return str(self.table())
+
+
+def _refuse_turned(limit: Limit, values: Sequence[float]) -> None:
+    """Refuse a force or velocity of a direction that no value can exceed, since the bound has the other sign.
+
+    One that fails is left to fail. Gas and static forces may have either sign: of them there is a warning.
+    """
+    vacuous = values and all(limit._is_turned(value) and limit.kept_by(value) for value in values)
+    if vacuous and limit.quantity not in _STATIC:
+        name, bound = ("maximum", limit.maximum) if limit.minimum is None else ("minimum", limit.minimum)
+        unit = UNITS[limit.quantity]
+        is_now = f"{name} {bound:g} {unit} for {values[0]:.4g} {unit} of {limit.quantity}"
+        _checks.refuse("limits", "have the sign of what is measured", is_now, f"{limit._remedy()}.")
 
 
 def read_limits(path: str | os.PathLike[str]) -> tuple[Limit, ...]:

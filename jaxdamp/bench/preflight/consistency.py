@@ -51,11 +51,15 @@ def _drives(e: Examined) -> bool:
 
 
 def _rate(e: Examined, values: Samples) -> float:
-    """RMS of the change per sample relative to that of the values, smoothed over a thirtieth of a period."""
+    """RMS of the change per sample relative to that of the values, smoothed over a thirtieth of a period.
+
+    NaN, which is not below any rate, where the values do not change.
+    """
     width = max(int(e.samples_per_cycle / 30), 1)
     sums = np.concatenate([[0.0], np.cumsum(values[e.moving] - np.mean(values[e.moving]))])
     smooth = (sums[width:] - sums[:-width]) / width
-    return float(np.sqrt(np.mean(np.diff(smooth) ** 2)) / np.std(smooth))
+    deviation = float(np.std(smooth))
+    return float(np.sqrt(np.mean(np.diff(smooth) ** 2))) / deviation if deviation > 0.0 else float("nan")
 
 
 def velocity(e: Examined) -> list[Finding]:

@@ -48,6 +48,7 @@ _SAMPLED = 50.0  # Hz, at which a record in minutes is sampled at the least
 _CLEARLY = 2.0  # times beyond what is usual, the factors of all multiplied, from which one unit is said to be wrong
 _IMPOSSIBLE = 10.0  # times the usual upper end of these two, from which a unit is wrong
 _BOUNDED = ("peak velocity", "amplitude")
+_NOTHING = 1e-30  # taken for a magnitude of zero, such as the deviation of a constant force: no quotient overflows
 
 
 def rest(e: Examined) -> list[Finding]:
@@ -142,7 +143,7 @@ def _magnitudes(e: Examined) -> Float[np.ndarray, " magnitudes"]:
 def _times_beyond(values: Float[np.ndarray, " magnitudes"]) -> Float[np.ndarray, " magnitudes"]:
     """How many times each number is below or above what is usual; 1 within."""
     low, high = (np.array([row[i] for row in _USUAL]) for i in (2, 3))
-    return np.maximum(np.maximum(low / np.maximum(values, np.finfo(float).tiny), values / high), 1.0)
+    return np.maximum(np.maximum(low / np.maximum(values, _NOTHING), values / high), 1.0)
 
 
 def _mistaken_unit(
