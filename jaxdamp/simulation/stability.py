@@ -61,9 +61,7 @@ class Slopes(NamedTuple):
 class _Samples(NamedTuple):
     """Slopes of a law at many velocities and strokes, as `Slopes` takes the largest of them; arrays."""
 
-    damping: (
-        Array | np.ndarray
-    )  # at strokes and velocities: at an instant, or over a step where states are extrapolated [N s/m]
+    damping: Array | np.ndarray  # at strokes and velocities; over a step where states are extrapolated [N s/m]
     by_velocity: Array | np.ndarray | None = None  # through the states, [N/m]
     by_stroke: Array | np.ndarray | None = None  # [N/m]
     rates: Array | np.ndarray | None = None  # of the states, where an explicit step carries them on, [1/s]
