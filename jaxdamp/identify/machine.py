@@ -218,7 +218,10 @@ def lag_time(runs: Sequence[BenchRun]) -> float:
     for run in runs:
         omega = 2 * np.pi * run.frequency
         turning = np.exp(-1j * omega * run.time) * np.hanning(len(run))
-        lead = np.angle((run.velocity - run.velocity.mean()) @ turning / ((run.force - run.force.mean()) @ turning))
+        velocity, force = (
+            part @ turning for part in (run.velocity - run.velocity.mean(), run.force - run.force.mean())
+        )
+        lead = np.angle(velocity / force) if force else 0.0
         if 0.0 < lead < 1.4:
             times.append(np.tan(lead) / omega)
     return float(np.clip(np.median(times) if times else 1e-3, 1e-4, 0.1))

@@ -21,6 +21,7 @@ from jaxdamp.dampers import (
     Table,
 )
 from jaxdamp.export import from_json, to_json
+from jaxdamp.identify.machine import lag_time
 from jaxdamp.parameters import get
 from jaxdamp.rig import Rig
 
@@ -170,6 +171,11 @@ def test_every_law_is_without_the_static_force_that_the_machine_has():
         Bilinear(2000.0, 1000.0) + Spring(1000.0), runs, rig="offset", bounds={"preload": (-99.0, 9.0)}
     )
     assert named.rig is None and named["preload"].value == pytest.approx(-90.0, abs=15.0)
+
+
+def test_a_constant_force_shows_no_lag():
+    time = np.arange(500) / 500.0
+    assert lag_time([BenchRun.from_arrays("held", time, 0.01 * np.sin(6.0 * time), np.full(500, 100.0))]) == 1e-3
 
 
 @pytest.mark.parametrize("effect", ["delay", "mass", "friction", "gas_stiffness"])
