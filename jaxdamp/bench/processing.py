@@ -103,6 +103,12 @@ class Origin(NamedTuple):
 
 def processed(raw: "BenchRun", steps: Steps) -> "BenchRun":
     """A record of the raw one, with all steps done and named in its notes."""
+    for name in ("delay", "low_pass", "between"):
+        if raw.of_points and getattr(steps, name) is not None:
+            remedy = "The points of a force-velocity table have no time: leave it out."
+            _checks.refuse(
+                name, "be asked for of records over time", f"{getattr(steps, name)} for {raw.name!r}", remedy
+            )
     run = replace(raw)
     if steps.delay is not None:
         run = _align(run, float(steps.delay))

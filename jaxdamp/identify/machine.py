@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
@@ -199,9 +199,19 @@ def without_machine(rig: Rig | None, runs: Sequence[BenchRun]) -> list[BenchRun]
     return [dataclasses.replace(run, force=run.force - force) for run, force in zip(runs, added, strict=True)]
 
 
+def _slowest(run: BenchRun) -> Bool[np.ndarray, " time"]:
+    """The samples near rest; of a table that has none, the points nearest to it in both directions."""
+    speed, near = np.abs(run.velocity), np.abs(run.velocity) < NEAR_REST * run.peak_velocity
+    if near.any():
+        return near
+    return np.any(
+        [speed == np.min(speed, where=side, initial=np.inf) for side in (run.velocity > 0, run.velocity < 0)], 0
+    )
+
+
 def _shown(runs: Sequence[BenchRun]) -> _Records:
     force, stroke = (np.concatenate([getattr(run, name) for run in runs]) for name in ("force", "stroke"))
-    slow = np.concatenate([np.abs(run.velocity) < NEAR_REST * run.peak_velocity for run in runs])
+    slow = np.concatenate([_slowest(run) for run in runs])
     level = float(np.mean(force[slow]))
     around = stroke[slow] - np.mean(stroke[slow])
     stiffness = float(around @ force[slow] / max(around @ around, np.finfo(float).tiny))

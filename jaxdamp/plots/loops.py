@@ -1,6 +1,6 @@
 """A fit and its records: loops of force over velocity and over stroke, channels of a vehicle, and the residual."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -11,6 +11,7 @@ from jaxdamp._types import Figure
 from jaxdamp.bench import BenchRun, as_runs, last_steady_cycle
 from jaxdamp.identify import Comparison, FitResult, VehicleFit
 from jaxdamp.plots import _axes, _style
+from jaxdamp.plots.curves import force_velocity
 from jaxdamp.plots.rides import unit_and_sign
 
 
@@ -21,6 +22,8 @@ def fit_loops(
     result: FitResult, runs: BenchRun | Sequence[BenchRun] | None = None, *, most: int = 6, name: str = ""
 ) -> Figure:
     """Loops of force over velocity and over stroke, measured and fitted, with the residual.
+
+    Points of a force-velocity table have no loops: they and the law are drawn by `plots.force_velocity`.
 
     For each record the last full cycle is drawn. Of many records only some are drawn, spread evenly over the peak
     velocities, and the title says so. The residual is fitted minus measured. Over the velocity it is reduced to about
@@ -43,6 +46,8 @@ def fit_loops(
     runs = result.runs if runs is None else as_runs(runs)
     if not runs:
         _checks.refuse("runs", "hold at least one record", "empty")
+    if all(run.of_points for run in runs):
+        return _over_points({name or type(result.law).__name__: result}, runs)
     shown = spread(runs, most)
     # All records at once: their shapes are those of the fit's scores, for which all is compiled.
     predicted = dict(zip(map(id, runs), result.respond(tuple(runs)), strict=True))
@@ -90,6 +95,8 @@ _MOST_LAWS = 12  # of small multiples
 def loops_by_law(comparison: Comparison, record: str | None = None) -> Figure:
     """The same record in a small panel for each law, the best first: measured force and that of the law over velocity.
 
+    Of points of a force-velocity table the curves of all laws over them.
+
     Arguments:
         comparison: of `identify.compare`; of more than twelve laws the best are drawn, and the title says so.
         record: name of a fitted record; the fastest if left out.
@@ -104,6 +111,8 @@ def loops_by_law(comparison: Comparison, record: str | None = None) -> Figure:
     _checks.one_of("record", name, [run.name for run in runs])
     rungs = sorted(comparison.rungs, key=lambda rung: rung.error)
     shown = rungs[:_MOST_LAWS]
+    if all(run.of_points for run in runs):
+        return _over_points({rung.name: rung.result for rung in shown}, runs)
     columns = min(len(shown), 4)
     figure = _style.new_figure(3.0 * columns, 0.8 + 2.5 * -(-len(shown) // columns))
     panels = figure.subplots(-(-len(shown) // columns), columns, sharex=True, sharey=True, squeeze=False)
@@ -130,6 +139,13 @@ def loops_by_law(comparison: Comparison, record: str | None = None) -> Figure:
     words = f"{name}: measured (grey) and each law (blue), with its error {judged}{few}"
     figure.suptitle(words, x=0.01, ha="left", fontsize="medium", wrap=True)
     return figure
+
+
+def _over_points(results: Mapping[str, FitResult], runs: Sequence[BenchRun]) -> Figure:
+    """The curves of laws over the points of a table, with the static force of the machine, if one has it, left out."""
+    machine = next((result.rig for result in results.values() if result.rig is not None), None)
+    static = 0.0 if machine is None else float(machine.force_offset) + float(machine.gas_force)
+    return force_velocity({name: result.law for name, result in results.items()}, runs=runs, static_force=static)
 
 
 def _title(result: FitResult, runs: Sequence[BenchRun], shown: Sequence[BenchRun], name: str) -> str:

@@ -162,6 +162,21 @@ def test_a_law_is_fitted_to_a_table(tmp_path):
     assert float(get(result.law, "rate")) == pytest.approx(1000.0, rel=1e-3)
 
 
+def test_a_table_without_slow_points_is_fitted_beside_an_offset_and_drawn_as_points(tmp_path):
+    velocity = np.array([-0.5, -0.3, -0.1, 0.05, 0.3, 0.5])  # none below a tenth of the largest
+    rows = "\n".join(f"{v},{2000.0 * v - 60.0}" for v in velocity)
+    runs = bench.read_table(written(tmp_path, f"v [m/s],F [N]\n{rows}\n"), sign="rebound-positive").runs()
+    result = identify.fit(dampers.Linear, runs, rig=["offset", "gas_stiffness"], freeze=["gas_stiffness"])
+    assert result["force_offset"].value == pytest.approx(-60.0, abs=0.1)
+    compared = identify.compare({"linear": dampers.Linear}, runs)
+    for figure in (result.plot(), compared.plot("loops")):
+        (axes,) = figure.axes
+        points = next(line for line in axes.lines if line.get_label() == "points of the table")
+        np.testing.assert_allclose(np.sort(points.get_xdata()), velocity)
+    with pytest.raises(ValueError, match=r"`low_pass` must be asked for of records over time, but is 20.0 for"):
+        runs[0].process(low_pass=20.0)
+
+
 def test_a_fit_to_a_table_knows_its_points_and_no_more(tmp_path):
     """Errors are those of least squares over the points, which are left out whole; free curves predict worse."""
     velocity = np.array([-1.048, -0.524, -0.262, -0.131, -0.052, 0.052, 0.131, 0.262, 0.524, 1.048])
