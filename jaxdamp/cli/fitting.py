@@ -13,7 +13,7 @@ from jaxdamp.cli.jobs import Job, Output, job, write_tables
 from jaxdamp.cli.limits import bounds_in_si
 from jaxdamp.cli.line_fitting import fit_line, fit_table, records_of, through_points
 from jaxdamp.cli.options import Call
-from jaxdamp.cli.records import Reading, decisions, grouped, law_names, split
+from jaxdamp.cli.records import Reading, decisions, grouped, law_names, names_of, split
 from jaxdamp.cli.signatures import Arguments
 from jaxdamp.cli.vehicle_words import read_law
 from jaxdamp.dampers import AbstractDamper
@@ -107,7 +107,7 @@ def fit(
         refused = [*_given(**given, resume=resume), *reading.of_records, *how.given, *["rig"] * (rig != RIG)]
         fit_table(screen, table, kind, output, report, refused)
         return
-    names = law_names(law)
+    names = law_names(law, points=table is not None)
     options = _options(how, rig)
     beside = None if baseline is None else read_law("baseline", baseline)
     if report is not None and group_by is not None:
@@ -271,7 +271,8 @@ def show(screen: Screen, fits: Fitted) -> None:
     if not several or screen.verbose:
         screen.table(parameters_of(best))
     screen.points(fits.failures, style="red")
-    further = len(set(identify.LAWS) - {rung.name for rung in comparison.rungs})
+    points = all(run.of_points for run in best.result.runs)
+    further = len(set(names_of(points=points)) - {rung.name for rung in comparison.rungs})
     if several and best.doubt and further:
         screen.points([f"--law all tries {further} further laws"])
     warnings = best.result.warnings if screen.verbose else best.result.main_warnings

@@ -12,7 +12,7 @@ from jaxdamp.blocks import command_of, import_zarr, note_command
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.jobs import Output, job, write_tables
 from jaxdamp.cli.limits import bounds_in_si
-from jaxdamp.cli.records import Reading, law_names
+from jaxdamp.cli.records import Reading, law_names, names_of
 from jaxdamp.cli.words import words
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import ControlCharts, ManyFits
@@ -20,7 +20,7 @@ from jaxdamp.report import result_report, table_report
 from jaxdamp.rig import Rig
 
 
-THROUGH_POINTS = {"all": dampers.Table, "table": dampers.Table, "spline_table": dampers.SplineTable}
+THROUGH_POINTS = {"table": dampers.Table, "spline_table": dampers.SplineTable}
 
 
 def through_points(law: Sequence[str]) -> type[dampers.Table] | type[dampers.SplineTable] | None:
@@ -31,8 +31,8 @@ def through_points(law: Sequence[str]) -> type[dampers.Table] | type[dampers.Spl
     if len(asked) == 1 and asked[0] in THROUGH_POINTS:
         return THROUGH_POINTS[asked[0]]
     for name in asked:
-        _checks.one_of("law", name, (*THROUGH_POINTS, *identify.NAMED_LAWS))
-        if name not in identify.NAMED_LAWS or identify.NAMED_LAWS[name].hysteresis:
+        _checks.one_of("law", name, ("all", *THROUGH_POINTS, *identify.NAMED_LAWS))
+        if name not in ("all", *names_of(points=True)):
             what = "one alone" if name in THROUGH_POINTS else "a law without hysteresis, which a table cannot show"
             _checks.refuse("law", f"be {what}", repr(name), 'See "jaxdamp laws".')
     return None

@@ -119,8 +119,15 @@ class Reading:
             screen.points([f"also {', '.join(more)}: --verbose prints all, the page has them"])
 
 
-def law_names(asked: Sequence[str]) -> list[str]:
+def names_of(*, points: bool) -> list[str]:
+    """All laws that are not optional; to fit to points of a force-velocity table, those without hysteresis."""
+    return [name for name in identify.LAWS if not (points and identify.NAMED_LAWS[name].hysteresis)]
+
+
+def law_names(asked: Sequence[str], *, points: bool = False) -> list[str]:
     """The laws to fit, each once: those named, with "all" all that are not optional; none for what suits the records.
+
+    To `points` of a force-velocity table only laws without hysteresis are fitted.
 
     >>> law_names(["linear, besinger", "linear"])
     ['linear', 'besinger']
@@ -132,7 +139,7 @@ def law_names(asked: Sequence[str]) -> list[str]:
         _checks.refuse("law", "name a law", "empty", 'See "jaxdamp laws".')
     for name in asked:
         _checks.one_of("law", name, ("all", *identify.NAMED_LAWS))
-    return list(dict.fromkeys(law for name in asked for law in (identify.LAWS if name == "all" else (name,))))
+    return list(dict.fromkeys(law for name in asked for law in (names_of(points=points) if name == "all" else (name,))))
 
 
 def split(runs: BenchSet, patterns: Sequence[str]) -> tuple[BenchSet, BenchSet]:

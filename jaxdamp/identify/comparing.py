@@ -239,7 +239,7 @@ def fit_each(
     def given(name: str, start: Start, held: tuple[str, ...] = ()) -> tuple[object, ...]:
         own = naming_only(named, _paths(_begun(start, runs, rig)), known) if known else named
         own = {**own, "rig": rig, "freeze": (*own["freeze"], *held)}
-        return name, start, tuple(runs), tuple(held_out), scheduled, in_time, own
+        return name, start, tuple(runs), tuple(held_out), scheduled, in_time, len(laws) > 1, own
 
     def kept(inputs: tuple[object, ...], compute: Callable[[], Computed]) -> Rung | Failure:
         def outcome() -> Rung | Failure:
@@ -279,6 +279,7 @@ def _outcome(
     held_out: Sequence[BenchRun],
     scheduled: bool,
     in_time: bool,
+    several: bool,
     how: dict[str, Any],
 ) -> Rung | Failure:
     """The fit of one law of a comparison, judged."""
@@ -289,6 +290,9 @@ def _outcome(
             judged = on_records(result, held_out)
         else:
             judged = None if isinstance(start, AbstractTrainedStart) else without_parts(result, in_time=in_time)
+        if judged is None and several and all(run.of_points for run in runs):
+            numbers, points = len(result.parameters), sum(map(len, runs))
+            return Failure(name, f"It has {numbers} numbers for {points} points, which cannot be judged beside others.")
         _ = result.error_shares  # which the table needs, computed here beside those of other laws
     except NUMERICAL as error:
         return Failure(name, str(error))

@@ -56,13 +56,16 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
     too. A number that the other parts do not determine keeps its value of the fit of all records.
 
     With `in_time` whole records are never left out, for fits with numbers that only one record determines and for those
-    that are compared with them. None where no part can be left out.
+    that are compared with them. None where no part can be left out, or where the points of a table without a quarter
+    are fewer than the numbers, which would keep the values that the whole has told.
     """
     evidence = result.evidence
     assert evidence is not None
     problem, start = evidence.problem, anchored_at(evidence)
     fitted = np.flatnonzero(np.isfinite(problem.sigma))
     runs = [problem.runs[i] for i in fitted]
+    if _are_too_few(runs, len(result.parameters)):
+        return None
     groups = motions(runs)
     whole = not in_time and len(groups) >= FEWEST_MOTIONS
     samples: list[Compared] = []
@@ -82,6 +85,12 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
     words = _quarters(runs, alike=len(groups) == 1) if not whole else f"each of {len(runs)} records{_WITHOUT}"
     words += ", velocities that no other reaches by the fit of all" * bool(beyond)
     return _together([*samples, *beyond], words)
+
+
+def _are_too_few(runs: Sequence[BenchRun], numbers: int) -> bool:
+    """Whether points of tables, without a quarter of them, are fewer than the numbers of a law."""
+    points = sum(map(len, runs))
+    return all(run.of_points for run in runs) and numbers > points - -(-points // PARTS)
 
 
 def _quarters(runs: Sequence[BenchRun], *, alike: bool) -> str:

@@ -71,6 +71,17 @@ def test_what_says_nothing_of_a_sheet_is_refused(sheet: Path) -> None:
         assert f"Option {option[0]} must be left out with a force-velocity table" in said, option
 
 
+def test_all_laws_are_those_that_a_sheet_can_tell(sheet: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    draw_nothing(monkeypatch)
+    points = [f"{v},{4000 * v if v > 0 else 2000 * v}" for v in (-0.5, -0.3, -0.1, 0.1, 0.3, 0.5)]
+    sheet.write_text("\n".join(["velocity [m/s],force [N]", *points]))
+    words = ("fit", sheet, "--sign", "rebound-positive", "--law", "all", "--out", sheet.parent / "fit")
+    said = " ".join(jaxdamp(*words).output.split())
+    assert "Recommended: bilinear" in said and "besinger_lag" not in said and "--law all" not in said
+    assert "table could not be fitted. It has 13 numbers for 6 points, which cannot be judged beside others." in said
+    assert from_json(sheet.parent / "fit" / "best_law.json").rebound_rate == pytest.approx(4000.0, rel=1e-6)
+
+
 def test_a_table_has_its_page_where_it_is_asked_for(sheet: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     draw_nothing(monkeypatch)
     jaxdamp("fit", sheet, "--out", sheet.parent / "fit", "--report", sheet.parent / "page.html")
