@@ -73,6 +73,9 @@ def truck_001(
     front axle, 1100 kg of each rear axle; wheelbase 4.5 m to the middle of a tandem of 1.3 m; radius of gyration in
     pitch 2.2 m; 40 kN s/m for the friction of the tandem's leaves; beams whose inertia is in the axles. Force and power
     of the front damper are those of one of the two, tyre loads and forces of the tandem those of both sides together.
+
+    Without the walking beam three springs carry the body, which leaves the loads at rest open. They follow from springs
+    that were all free of load on level ground, 65.3, 97.5 and 81.3 kN, and are not the published ones.
     """
     shock = Besinger(14.4e3, 15.6e3, 3.6e3, 0.125, 0.7) if damper is None else damper
     front = Corner(700.0, 2 * 252e3, 2 * 1100e3, shock, 2 * 500.0, damper_count=2)
