@@ -51,7 +51,7 @@ def ladder(comparison: Comparison | VehicleComparison) -> Figure:
         label = "RMS error, as a multiple of the smallest in the fitted drives   (free parameters in brackets)"
         _style.dress(axes, label, "", title)
     else:
-        handles.append(_dress_in_newtons(axes, comparison))
+        handles += _dress_in_newtons(axes, comparison)
         alike = [_style.in_words(rung.name) for rung in comparison.recommendation.alike]
         words = f"{' and '.join(alike)} predict alike within the scatter; the simplest is recommended."
         _style.note_below(figure, [words] * (len(alike) > 1))
@@ -64,11 +64,10 @@ def ladder(comparison: Comparison | VehicleComparison) -> Figure:
     return figure
 
 
-def _dress_in_newtons(axes: Axes, comparison: Comparison) -> "Line2D":
-    """Title and axes of errors in newtons, and in percent of the largest force; the line of the sensor's noise."""
+def _dress_in_newtons(axes: Axes, comparison: Comparison) -> list["Line2D"]:
+    """Title and axes of errors in newtons, and in percent of the largest force; the line of the noise, if there is one."""
     runs, best = comparison.best.result.runs, comparison.best
     largest = max(float(np.abs(run.force).max()) for run in runs)
-    noise = float(np.sqrt(np.mean([white_noise(run.force) ** 2 for run in runs])))
     share = f"{_style.quantity(best.error, 'N')} = {_style.short(100.0 * best.error / largest)} % of the largest force"
     title = f"{_style.in_words(best.name)}: {share}"
     _style.dress(axes, "RMSE of the force [N]   (free parameters in brackets)", "", title)
@@ -76,8 +75,11 @@ def _dress_in_newtons(axes: Axes, comparison: Comparison) -> "Line2D":
     to_percent, back = functools.partial(np.multiply, factor), functools.partial(np.multiply, 1.0 / factor)
     shares = axes.secondary_xaxis("top", functions=(to_percent, back))
     shares.set_xlabel("% of the largest force")
+    if all(run.of_points for run in runs):
+        return []
+    noise = float(np.sqrt(np.mean([white_noise(run.force) ** 2 for run in runs])))
     label = f"noise of the force, {_style.quantity(noise, 'N')}"
-    return axes.axvline(noise, color=_style.BLACK, linestyle=":", linewidth=1.2, label=label)
+    return [axes.axvline(noise, color=_style.BLACK, linestyle=":", linewidth=1.2, label=label)]
 
 
 def cross_validation(result: CrossValidation) -> Figure:

@@ -4,6 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import openpyxl
 import pytest
+from matplotlib.text import Text
 
 from jaxdamp import bench, dampers, identify
 from jaxdamp._display import Display, shown_in
@@ -173,6 +174,7 @@ def test_a_table_without_slow_points_is_fitted_beside_an_offset_and_drawn_as_poi
         (axes,) = figure.axes
         points = next(line for line in axes.lines if line.get_label() == "points of the table")
         np.testing.assert_allclose(np.sort(points.get_xdata()), velocity)
+    assert "noise" not in "".join(text.get_text() for text in compared.plot().findobj(Text))  # points have none
     with pytest.raises(ValueError, match=r"`low_pass` must be asked for of records over time, but is 20.0 for"):
         runs[0].process(low_pass=20.0)
 
