@@ -65,7 +65,7 @@ def ladder(comparison: Comparison | VehicleComparison) -> Figure:
 
 
 def _dress_in_newtons(axes: Axes, comparison: Comparison) -> list["Line2D"]:
-    """Title and axes of errors in newtons, and in percent of the largest force; the line of the noise, if there is one."""
+    """Title and axes of errors in newtons and in percent of the largest force; the line of the noise if it is known."""
     runs, best = comparison.best.result.runs, comparison.best
     largest = max(float(np.abs(run.force).max()) for run in runs)
     share = f"{_style.quantity(best.error, 'N')} = {_style.short(100.0 * best.error / largest)} % of the largest force"
