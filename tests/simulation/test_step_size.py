@@ -169,6 +169,7 @@ def test_a_stop_that_a_wheel_hits_hard_is_a_warning():
     assert np.abs(found - fine).max() < 0.1 * np.abs(fine).max()  # as large as the force itself in undivided steps
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [dampers.MonoTube.reference(), dampers.TwinTube.reference()], ids=["mono", "twin"])
 def test_compressible_oil_is_within_half_a_percent_at_the_default_step(law):
     """1.8 and 2.3 % in steps that are not divided."""
