@@ -33,8 +33,9 @@ _STEADY = 0.004  # amplitude by which a cycle may differ from the mean cycle
 _UNSTEADY = 0.5  # the same, beyond which a look at some of the samples is enough
 _ENOUGH, _A_CYCLE = 20_000, 20  # samples, in all and in a cycle, of such a look
 _LAST_SHARE = 0.005  # of the highest harmonics in the velocity, relative to the fundamental
-_AT_REST = 0.1  # of the largest speed
-_CONSTANT = 0.85  # of the largest speed but a tenth of the samples, which half of the motion exceeds
+_AT_REST = 0.02  # of the largest speed, which no stroke of a machine at rest exceeds
+_SHORTEST = 10  # samples of a stroke
+_CONSTANT = 0.85  # of the largest speed of a stroke but for a tenth of its samples, which half of it exceeds
 _QUIET = 0.03  # residual, relative to the amplitude, that is taken for ripple and noise of any colour
 
 
@@ -211,10 +212,12 @@ def _in_cycles(t: Samples, residual: Samples, omega: float) -> tuple[Float[np.nd
 
 
 def _is_mostly_constant(velocity: Samples) -> bool:
-    """Whether most of a motion, rest left out, has nearly its largest speed: that of a sine has 0.7 times of it."""
-    speed = np.abs(velocity)
-    moving = speed[speed > _AT_REST * speed.max()]
-    return bool(np.median(moving) > _CONSTANT * np.quantile(moving, 0.9))
+    """Whether most strokes of a motion have nearly one speed each: half of a sine is slower than 0.7 of its largest."""
+    turns = np.flatnonzero(np.diff(velocity > 0)) + 1
+    strokes = [np.abs(part) for part in np.split(velocity, turns) if len(part) >= _SHORTEST]
+    moving = [speed for speed in strokes if speed.max() > _AT_REST * np.abs(velocity).max()]
+    constant = [len(speed) for speed in moving if np.median(speed) > _CONSTANT * np.quantile(speed, 0.9)]
+    return sum(constant) > 0.5 * sum(map(len, moving))
 
 
 def _window(

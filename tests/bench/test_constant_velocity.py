@@ -38,6 +38,13 @@ def test_no_corner_makes_the_velocity_overshoot(velocity, turn):
     assert np.sqrt(np.mean((found - true)[50:-50] ** 2)) < (0.06 if turn == 0.0 else 0.015) * velocity
 
 
+def test_strokes_of_several_velocities_in_one_record_do_not_overshoot_either():
+    each = [triangle(velocity, duration=8 * 0.03 / velocity, noise=0.0) for velocity in (0.05, 0.1, 0.2)]
+    stroke = np.concatenate([part[1] for part in each])
+    velocity, how = estimate_velocity(np.arange(len(stroke)) / 1000, stroke)
+    assert "order 2" in how and np.abs(velocity[50:-50]).max() < 1.002 * 0.2
+
+
 @pytest.mark.parametrize("turn", [0.004, 0.02])
 def test_forces_are_those_of_the_constant_velocities(turn):
     found = evaluate([record(velocity, turn=turn) for velocity in (0.03, 0.1, 0.2)])
