@@ -52,12 +52,7 @@ from jaxdamp.bench.settings import (
 from jaxdamp.bench.units import ratio as ratio
 from jaxdamp.bench.velocity import estimate_velocity
 from jaxdamp.bench.virtual_dyno import VirtualDyno
-from jaxdamp.bench.waveforms import (
-    CommandedExcitation as CommandedExcitation,
-    CommandStep,
-    MultiSineTest,
-    TriangleTest,
-)
+from jaxdamp.bench.waveforms import CommandedExcitation as CommandedExcitation, CommandStep, MultiSineTest, TriangleTest
 
 
 __all__ = [

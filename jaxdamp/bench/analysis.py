@@ -8,8 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp.bench.motion import moving_span
-from jaxdamp.bench.peaks import at_peak, mean_where
+from jaxdamp.bench.motion import at_peak, mean_where, moving_span
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import as_runs
 
@@ -182,7 +181,6 @@ def _samples(run: BenchRun, start: float, stop: float) -> slice:
 
 
 def _steady_instants(run: BenchRun) -> list[tuple[float, float]]:
-    """Start and end [s] of each steady cycle."""
     cycles = list(itertools.pairwise(run.cycle_instants.tolist()))
     if not cycles:
         return []

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp._checks import ArgumentError, Setting
-from jaxdamp.bench import clock, sign as signs, stamps
+from jaxdamp.bench import clock, sign as signs
 from jaxdamp.bench.clock import Part, regular_parts
 from jaxdamp.bench.columns import REQUIRED, Choice, Column, find_columns
 from jaxdamp.bench.motion import Samples, cycle_instants
@@ -33,11 +33,7 @@ _MOST_BAD = 0.05  # share of the rows of a record that may be left out
 
 
 def bench_runs(table: RawTable, name: str, how: Interpretation) -> list[BenchRun]:
-    """The record of a table; several if it has gaps in time.
-
-    Raises:
-        ValueError: all that is wrong with the table.
-    """
+    """The record of a table; several if it has gaps in time."""
     columns, doubts = find_columns(table, how.choice)
     table = without_bad_rows(table, columns) if how.drop_bad_rows else table
     clock.check_count(len(table), table.where)
@@ -45,9 +41,7 @@ def bench_runs(table: RawTable, name: str, how: Interpretation) -> list[BenchRun
     notes = [_columns_note(table, columns), *table.notes, *doubts, *notes]
     motion = channels["stroke" if "stroke" in channels else "velocity"]
     parts = _parts(table, channels.pop("time", None), motion, how.sampling_rate)
-    if len(parts) == 1:
-        return [_record(table, columns, channels, parts[0], name, how, notes)]
-    names = [f"{name}_part{number}" for number in range(1, len(parts) + 1)]
+    names = [f"{name}_part{number}" for number in range(1, len(parts) + 1)] if len(parts) > 1 else [name]
     return [_record(table, columns, channels, part, n, how, notes) for part, n in zip(parts, names, strict=True)]
 
 
@@ -56,9 +50,6 @@ def without_bad_rows(table: RawTable, columns: Mapping[str, Column]) -> RawTable
 
     Their places, of ten rows one after the other at most, are bridged by straight lines between the rows around them,
     so that the time goes on; before the first good row and after the last one, as in a footer, they are cut off.
-
-    Raises:
-        ValueError: more bad rows than can be left out, or more of them one after the other.
     """
     used = [column.index for column in columns.values() if column.conversion is not None]
     bad = np.zeros(len(table), dtype=bool)
@@ -114,7 +105,7 @@ def _values(table: RawTable, raw: RawColumn, column: Column) -> tuple[Samples, s
         place = f"{table.where}, {table.place(row)}, column {column.header!r}"
         raise ArgumentError(f"{place}: {what}{more}. Mend or remove the line, or pass {drop}.", drop)
     if column.conversion is None:
-        return stamps.seconds(values, where, table.place)
+        return clock.seconds(values, where, table.place)
     values = column.conversion(np.ascontiguousarray(values))
     try:
         clock.check_numbers(values, f"{column.role} (column {column.header!r})", table.where, table.place)
@@ -168,7 +159,6 @@ def _from_rate(count: int, rate: float | int | None, where: str) -> Part:
 
 
 def _check_rate(parts: list[Part], rate: float | int | None, where: str) -> None:
-    """Refuse a sampling rate that contradicts the time column."""
     time = max(parts, key=lambda part: len(part.time)).time
     measured = (len(time) - 1) / (time[-1] - time[0]) if len(time) > 1 else 0.0
     if rate is not None and abs(rate - measured) > 0.01 * rate:
@@ -190,34 +180,33 @@ def _record(
     how: Interpretation,
     notes: list[str],
 ) -> BenchRun:
-    where = table.where
-    time, force = part.time, part.of(channels["force"])
-    velocity, source = (None if "velocity" not in channels else part.of(channels["velocity"])), ""
-    integrated = "stroke" not in channels
+    where, time = table.where, part.time
+    moved = {role: part.of(values) for role, values in channels.items()}
+    force, velocity, source = moved["force"], moved.get("velocity"), ""
+    integrated = "stroke" not in moved
     if velocity is not None and integrated:
         stroke, velocity, source = integrate_velocity(time, velocity, where)
     else:
-        stroke = part.of(channels["stroke"])
+        stroke = moved["stroke"]
         clock.check_stroke(stroke, f"{where}, column {columns['stroke'].header!r}")
     states_all = bool(table.preamble) and table.preamble[0].strip() == FILE_MARK
     if states_all:
         _refuse_signs(how, where)
         decision = signs.Decision(1.0, 1.0, ("positive stroke is rebound, as the file states",))
     else:
-        headers = _motion_headers(columns, channels)
+        headers = [columns[role].header for role in ("stroke", "velocity") if role in moved]
         decision = signs.decide(time, stroke, force, how.sign, how.force_sign, where, headers)
     if velocity is None or not (states_all or integrated):
         velocity, source = _velocity(time, stroke, velocity, where)
-    temperature = channels.get("temperature")
     stated = _stated(table) if states_all else {}
-    held, varying, unit, said = _commanded(columns, channels, part, stated.get("command"))
+    held, varying, unit, said = _commanded(columns, moved, stated.get("command"))
     return BenchRun(
         name,
         time,
         decision.motion * stroke,
         decision.motion * velocity,
         decision.force * force,
-        temperature=None if temperature is None else part.of(temperature),
+        temperature=moved.get("temperature"),
         command=held,
         command_channel=varying,
         command_unit=unit,
@@ -237,24 +226,19 @@ def _record(
 
 
 def _commanded(
-    columns: Mapping[str, Column], channels: Mapping[str, Samples], part: Part, stated: float | None
+    columns: Mapping[str, Column], channels: Mapping[str, Samples], stated: float | None
 ) -> tuple[float | None, Samples | None, str, list[str]]:
     """The command that is held, or else its channel and unit; and a note where a column shows that it is held."""
     conversion = columns["command"].conversion if "command" in channels else None
     if conversion is None:
         return stated, None, "", []
-    values = part.of(channels["command"])
+    values = channels["command"]
     if np.ptp(values) > 0.0:
         return None, values, conversion.si, []
     return float(values[0]), None, "", [f"command held at {values[0]:g} {conversion.si}, by its column"]
 
 
-def _motion_headers(columns: Mapping[str, Column], channels: Mapping[str, Samples]) -> list[str]:
-    return [columns[role].header for role in ("stroke", "velocity") if role in channels]
-
-
 def _refuse_signs(how: Interpretation, where: str) -> None:
-    """A file that the library wrote states its sign."""
     if how.sign == "compression-positive" or how.force_sign == "opposite":
         words = (("sign", how.sign), ("force_sign", how.force_sign))
         given = [Setting(name, word) for name, word in words if word]

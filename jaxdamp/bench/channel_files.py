@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from jaxdamp.bench.raw import RawColumn, RawTable
-from jaxdamp.bench.raw_tables import Clock, Untyped, alone, apart, library, tables_by_clock
+from jaxdamp.bench.raw import Clock, RawColumn, RawTable, Untyped, alone, apart, library, tables_by_clock
 
 
 _UNSET = np.datetime64("1904-01-01T00:00:00", "ns")  # the zero of LabVIEW, where no start was written

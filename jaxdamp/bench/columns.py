@@ -9,10 +9,10 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
+from jaxdamp.bench.clock import is_stamp
 from jaxdamp.bench.headers import NOT_MEASURED, ROLES, role_of, signal_unit, split_header, tail_unit, words_in
 from jaxdamp.bench.layout import GROUPED, PLAINLY
 from jaxdamp.bench.raw import Problems, RawColumn, RawTable
-from jaxdamp.bench.stamps import is_stamp
 from jaxdamp.bench.units import USUAL, Conversion, conversion, gain_conversion, named_conversion, ratio
 
 
@@ -39,14 +39,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Choice:
-    """What the caller says about the columns.
-
-    Arguments:
-        columns: quantity to header or number of the column (from 0); None means that the file's column is not used.
-        units: quantity to unit; wins over the header.
-        gains: quantity to gain of the sensor, "500 N/V".
-        stroke_from_velocity: integrate the velocity where a table has no stroke.
-    """
+    """What the caller says about the columns, as `BenchFiles` describes it; units win over those of headers."""
 
     columns: Mapping[str, str | int | None] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
@@ -69,13 +62,7 @@ def find_columns(table: RawTable, choice: Choice) -> tuple[dict[str, Column], tu
     """Assign the columns of a table to time, stroke, velocity, force, temperature and command.
 
     A quantity that a record can do without, velocity, temperature or command, is left out where its column is
-    doubtful, and a note says so, unless the caller asked for it.
-
-    Returns:
-        The column of each quantity, and notes.
-
-    Raises:
-        ValueError: a quantity is missing or named by two columns, or a unit is missing or unknown; all that is wrong.
+    doubtful, and a note says so, unless the caller asked for it. All that is wrong is refused together.
     """
     if not table.is_named and not choice.columns:
         numbers = Setting("columns", {"time": 0, "stroke": 1, "force": 2})
@@ -90,7 +77,8 @@ def find_columns(table: RawTable, choice: Choice) -> tuple[dict[str, Column], tu
     for role in ROLES:
         with problems.collected():
             try:
-                column, more = _column(table, role, choice)
+                index, more = _index(table, role, choice)
+                column = None if index is None else column_of(table, role, index, choice)
             except ArgumentError as error:
                 if role in REQUIRED or role == "time" or choice.asks_for(role):
                     columns[role] = None  # there is one, but it is at fault
@@ -130,19 +118,6 @@ def find_one(table: RawTable, role: str, choice: Choice) -> int | None:
     return _index(table, role, choice)[0]
 
 
-def _index(table: RawTable, role: str, choice: Choice) -> tuple[int | None, list[str]]:
-    if role in choice.columns:
-        wanted = choice.columns[role]
-        return (None if wanted is None else given_column(table, role, wanted)), []
-    return _named(table, role, choice)
-
-
-def _column(table: RawTable, role: str, choice: Choice) -> tuple[Column | None, list[str]]:
-    """The column of a quantity, and a note where its unit decided between several."""
-    index, notes = _index(table, role, choice)
-    return (None if index is None else column_of(table, role, index, choice)), notes
-
-
 def given_column(table: RawTable, role: str, wanted: str | int, argument: str = "columns") -> int:
     """The number of the column that the caller names for a quantity, by its header or number, in an argument."""
 
@@ -180,6 +155,14 @@ def _candidates(table: RawTable, role: str, choice: Choice) -> list[int]:
     taken = {place for wanted in choice.columns.values() for place in _places(table, wanted)}
     columns = enumerate(table.columns)
     return [i for i, column in columns if i not in taken and role_of(column.name, column.unit) == role]
+
+
+def _index(table: RawTable, role: str, choice: Choice) -> tuple[int | None, list[str]]:
+    """The number of the column of a quantity, and a note where its unit decided between several."""
+    if role in choice.columns:
+        wanted = choice.columns[role]
+        return (None if wanted is None else given_column(table, role, wanted)), []
+    return _named(table, role, choice)
 
 
 def _named(table: RawTable, role: str, choice: Choice) -> tuple[int | None, list[str]]:
@@ -234,10 +217,8 @@ def column_of(table: RawTable, role: str, index: int, choice: Choice) -> Column:
     if role in choice.gains:
         unit = choice.units.get(role) or stated or signal_unit(name)
         return Column(role, index, header, gain_conversion(role, choice.gains[role], unit, where))
-    if role in choice.units:
-        return Column(role, index, header, named_conversion(role, choice.units[role], where))
-    if stated:
-        return Column(role, index, header, named_conversion(role, stated, where))
+    if role in choice.units or stated:
+        return Column(role, index, header, named_conversion(role, choice.units.get(role, stated), where))
     if tail:
         return Column(role, index, header, tail[1])
     signal = signal_unit(name)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from jaxdamp.bench.motion import crossings, extended
+from jaxdamp.bench.motion import crossings, extended, mean_in_bins, mean_where
 from jaxdamp.bench.runs import BenchRun
 
 
@@ -136,27 +136,13 @@ def _mean_cycle(run: BenchRun) -> _Cycle | None:
     within = (run.time >= instants[0]) & (run.time < instants[-1])
     phase = np.interp(run.time[within], instants, np.arange(count + 1.0))
     bins = np.minimum((phase * _BINS).astype(int), count * _BINS - 1)
-
-    def folded(values: Float[np.ndarray, " time"]) -> Float[np.ndarray, "cycles bins"]:
-        samples = np.bincount(bins, minlength=count * _BINS)
-        sums = np.bincount(bins, values[within], minlength=count * _BINS)
-        return np.divide(sums, samples, out=np.full(sums.shape, np.nan), where=samples > 0).reshape(count, _BINS)
-
-    stroke, force = folded(run.stroke), folded(run.force)
-    path, mean = _mean_over_cycles(stroke), _mean_over_cycles(force)
+    channels = (mean_in_bins(bins, values[within], count * _BINS) for values in (run.stroke, run.force))
+    stroke, force = (folded.reshape(count, _BINS) for folded in channels)
+    path, mean = (mean_where(folded.T, np.isfinite(folded.T)) for folded in (stroke, force))
     if np.nanmedian(np.abs(stroke - path)) > SAME_SHAPE * run.amplitude:
         return None
     scatter = float(np.sqrt(np.nanmean((force - mean) ** 2) / (count - 1))) if count > 1 else 0.0
     return _Cycle(path - np.nanmean(path), mean, scatter)
-
-
-def _mean_over_cycles(values: Float[np.ndarray, "cycles bins"]) -> Float[np.ndarray, " bins"]:
-    """The mean over the cycles that have samples in a bin; NaN where none has."""
-    sampled = np.isfinite(values)
-    count = sampled.sum(axis=0)
-    return np.divide(
-        np.where(sampled, values, 0.0).sum(axis=0), count, out=np.full(count.shape, np.nan), where=count > 0
-    )
 
 
 def repeats(runs: Sequence[BenchRun]) -> list[list[BenchRun]]:

@@ -13,7 +13,7 @@ from typing import final
 from jaxdamp import _checks
 from jaxdamp._files import FOLDER_SUFFIXES, natural_key
 from jaxdamp.bench.manifest import NAME, find_manifest
-from jaxdamp.bench.raw_tables import library
+from jaxdamp.bench.raw import library
 from jaxdamp.bench.read import read
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import BenchSet, as_runs
@@ -106,7 +106,6 @@ class DamperRecords(Mapping[str, tuple[BenchRun, ...]]):
 
 
 def _processed(read: Callable[..., object], steps: Mapping[str, object], key: object) -> BenchSet:
-    """The records of a damper with steps done."""
     process: Callable[..., BenchSet] = BenchSet(as_runs(read(key))).process
     return process(**steps)
 

@@ -20,17 +20,7 @@ from jaxdamp.bench.raw import Problems
 from jaxdamp.bench.readers import FILES, READERS, Files, read_tables, with_own
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import BenchSet
-from jaxdamp.bench.table_points import (
-    SIDES,
-    Curve,
-    How,
-    Points,
-    curves_of,
-    is_force_velocity,
-    sides_of,
-    stated_sign,
-    with_headers,
-)
+from jaxdamp.bench.table_points import SIDES, Curve, curves_of, is_force_velocity, sides_of, stated_sign, with_headers
 from jaxdamp.dampers import AbstractDamper, FittedRange, Scheduled, SplineTable, Table as TableLaw, with_fitted_range
 
 
@@ -84,7 +74,8 @@ class ForceVelocityTable:
                 there = ", ".join(map(repr, self.settings))
                 _checks.refuse("setting", "be named", "left out", f"The settings have no numbers: {there}.")
             grid = np.unique(np.concatenate([curve.velocity for curve in self.curves]))
-            laws = tuple(kind(grid, _on(curve, grid)) for curve in self.curves)
+            own = [TableLaw(curve.velocity, curve.force) for curve in self.curves]  # with end slopes beyond its points
+            laws = tuple(kind(grid, [float(each.force_velocity(v)) for v in grid]) for each in own)
             levels = [float(curve.command or 0.0) for curve in self.curves]
             law = Scheduled(laws, levels, levels[0])
             return with_fitted_range(law, replace(_range(self.curves), command=(levels[0], levels[-1])))
@@ -126,11 +117,6 @@ class ForceVelocityTable:
 
     def __repr__(self) -> str:
         return "\n".join([f"{self.table()}", *self.notes])
-
-
-def _on(curve: Curve, grid: Points) -> Points:
-    """Forces of a curve at other velocities, with its end slopes beyond its points."""
-    return np.asarray([float(TableLaw(curve.velocity, curve.force).force_velocity(v)) for v in grid])
 
 
 def _range(curves: Sequence[Curve]) -> FittedRange:
@@ -205,26 +191,25 @@ def read_table(
     given = {"sign": sign, "columns": columns, "units": files["units"], "delimiter": files["delimiter"]}
     asked, given, notes = with_manifest(paths, manifest, given, TABLE_KEYS)
     signs.check_words(given["sign"], None)
-    choice = Choice({**(given["columns"] or {})}, {**(given["units"] or {})})
+    choice = Choice(given["columns"] or {}, given["units"] or {})
     sheets, readers = find_files(asked, {*FOLDER_SUFFIXES, *(files["readers"] or {})}), with_own(files["readers"])
-    notes, sides, problems, how, stated = [*notes], [], Problems(), How(choice, given["sign"], side), set()
+    notes, sides, problems, sign, stated = [*notes], [], Problems(), given["sign"], set()
     for file in sheets:
         with problems.collected():
             tables = [with_headers(table) for table in read_tables(file, readers, given["delimiter"])]
-            fitting = [table for table in tables if is_force_velocity(table, how.choice)]
+            fitting = [table for table in tables if is_force_velocity(table, choice)]
             if not fitting:
                 there = ", ".join(name for table in tables for name in table.names)
                 what = "which has a velocity, forces and no time"
                 raise ValueError(f"{file} is no force-velocity table, {what}: its columns are {there}.")
             for table in fitting:
                 stated.add(stated_sign(table))
-                found, said = sides_of(table, how)
+                found, said = sides_of(table, choice)
                 sides += found
                 notes += said
     problems.raise_any()
-    if how.sign is None and len(stated) == 1:
-        how = replace(how, sign=stated.pop())
-    curves, said = curves_of(sides, how)
+    sign = stated.pop() if sign is None and len(stated) == 1 else sign
+    curves, said = curves_of(sides, sign, side)
     name, of_files = _called(sheets)
     return ForceVelocityTable(name, curves, tuple(dict.fromkeys([*notes, *of_files, *said])))
 
@@ -256,7 +241,7 @@ def are_tables(
     """
     given = {"columns": columns, "units": units, "delimiter": delimiter}
     asked, given, _ = with_manifest(paths, manifest, given, BENCH_KEYS)
-    choice = Choice({**(given["columns"] or {})}, {**(given["units"] or {})})
+    choice = Choice(given["columns"] or {}, given["units"] or {})
     files = find_files(asked, FOLDER_SUFFIXES)
     if any(file.stat().st_size > _LARGEST for file in files):
         return False

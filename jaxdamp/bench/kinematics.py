@@ -14,9 +14,9 @@ from jaxdamp._files import FOLDER_SUFFIXES, find_files
 from jaxdamp.bench import sign as signs
 from jaxdamp.bench.columns import Choice, given_column, in_si, numbers_of
 from jaxdamp.bench.headers import direction_of, split_header
-from jaxdamp.bench.one_clock import main_tables
 from jaxdamp.bench.raw import RawTable
 from jaxdamp.bench.readers import READERS, read_tables
+from jaxdamp.bench.record_tables import main_tables
 from jaxdamp.bench.table_points import Points
 from jaxdamp.bench.units import conversion
 from jaxdamp.dampers import AbstractDamper, Linkage
@@ -134,10 +134,7 @@ def _columns(table: RawTable, chosen: Mapping[str, str | int]) -> dict[str, int]
             both = f"{table.names[found[role]]!r} and {name!r}"
             raise ArgumentError(f"{table.where}: {both} could both be the {role}. Choose one: {choose}.", choose)
         found[role] = index
-    if "ratio" in chosen or "damper" not in found:
-        found.pop("damper", None)
-    else:
-        found.pop("ratio", None)
+    found.pop("damper" if "ratio" in chosen or "damper" not in found else "ratio", None)  # one is enough
     lacking = [role for role in ("wheel", "damper" if "ratio" not in found else "ratio") if role not in found]
     if lacking:
         choose = Setting("columns", dict.fromkeys(lacking, ...))
@@ -182,7 +179,6 @@ def _ratios(table: RawTable, index: int) -> Points:
 
 
 def _check_points(table: RawTable, travel: Points) -> None:
-    """Refuse too few points, and equal wheel travels."""
     if len(travel) < 2:
         raise ValueError(f"{table.where} must hold two or more points with numbers, but has {len(travel)}.")
     equal = np.flatnonzero(np.diff(travel) <= 0.0)
@@ -204,7 +200,6 @@ def _slopes(table: RawTable, travel: Points, damper: Points) -> Points:
 
 
 def _check_ratios(table: RawTable, travel: Points, ratio: Points) -> None:
-    """Refuse ratios that are not positive."""
     if np.any(ratio <= 0.0):
         k = int(np.argmax(ratio <= 0.0))
         raise ValueError(

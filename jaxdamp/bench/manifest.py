@@ -91,11 +91,7 @@ def find_manifest(manifest: str | os.PathLike[str] | bool | None, folders: Seque
 
 
 def _read_manifest(file: Path, keys: Kinds) -> Contents:
-    """The arguments that a manifest holds.
-
-    Raises:
-        ValueError: no TOML, an unknown key, or a value of the wrong kind, naming file and key.
-    """
+    """The arguments that a manifest holds."""
     stated = read_toml(file)
     for key, value in stated.items():
         if key not in keys:

@@ -6,8 +6,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from jaxdamp.bench.raw import RawColumn, RawTable
-from jaxdamp.bench.raw_tables import Untyped, alone, library, tables_by_clock
+from jaxdamp.bench.raw import RawColumn, RawTable, Untyped, alone, library, tables_by_clock
 
 
 _MOST_COLUMNS = 64  # of a matrix that is taken for channels side by side
@@ -124,11 +123,7 @@ def _is_samples(value: object) -> bool:
 
 
 def _scaled(where: str, values: np.ndarray, fields: Structure) -> tuple[np.ndarray, list[str]]:
-    """The samples of a channel by the scale and offset beside them, if they are counts, and a note.
-
-    Raises:
-        ValueError: several fields that could be the scale, or one of several numbers.
-    """
+    """The samples of a channel by the scale and offset beside them, if they are counts, and a note."""
     factors, offsets = _scalars(fields, _FACTORS), _scalars(fields, _OFFSETS)
     several = [f"{key} ({value.size} numbers)" for key, value in fields.items() if _scales(key) and _is_samples(value)]
     names = ", ".join((*factors, *offsets, *several))

@@ -1,7 +1,7 @@
-"""What kind of motion a stroke is: its frequency, its cycles, its amplitude."""
+"""What kind of motion a stroke is: its frequency, its cycles, its amplitude, where its velocity is largest."""
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 
 Samples = Float[np.ndarray, " time"]
@@ -174,3 +174,59 @@ def savitzky_golay(values: Samples, window: int, order: int, derivative: int = 0
     weights = savitzky_golay_weights(half, order, derivative)
     inner = np.correlate(values, weights[half], "valid")
     return np.concatenate([weights[:half] @ values[:window], inner, weights[half + 1 :] @ values[-window:]])
+
+
+NEAR_PEAK = 0.98  # of the peak velocity, beyond which samples count as taken at the peak
+CENTRAL = 0.1  # share of the stroke range that counts as mid-stroke
+STEADY = 0.5  # the same, of strokes at constant velocity, clear of their turns
+CONSTANT, MOST = 0.1, 0.7  # of the velocity at mid-stroke, within which most of the samples of such a stroke are
+
+Cycles = Float[np.ndarray, "cycles points"]
+Figures = Float[np.ndarray, " cycles"]
+
+
+def at_peak(stroke: Cycles, directed: Cycles) -> Bool[np.ndarray, "cycles points"]:
+    """The samples near the largest velocity of a direction, in which `directed` is positive.
+
+    In strokes at constant velocity those of their central half: what is largest there is noise, and what a velocity
+    estimated from the stroke makes of the turns.
+    """
+    highest = directed.max(axis=1, keepdims=True)
+    near = (directed >= NEAR_PEAK * highest) & (highest > 0)
+    constant = speed_is_constant(stroke, directed)[:, None]
+    return np.where(constant, around_middle(stroke, STEADY) & (directed > 0), near)
+
+
+def speed_is_constant(stroke: Cycles, directed: Cycles) -> Bool[np.ndarray, " cycles"]:
+    """Whether the strokes in a direction have one velocity; a sine has nearly its largest in 0.3 of its time."""
+    moving = directed > 0
+    level = mean_where(directed, moving & around_middle(stroke, CENTRAL))[:, None]
+    near = moving & (np.abs(directed - level) <= CONSTANT * level)
+    return near.sum(axis=1) > MOST * moving.sum(axis=1)
+
+
+def around_middle(stroke: Cycles, share: float) -> Bool[np.ndarray, "cycles points"]:
+    """The samples within a share of the stroke range around its middle."""
+    highest, lowest = stroke.max(axis=1, keepdims=True), stroke.min(axis=1, keepdims=True)
+    return np.abs(stroke - 0.5 * (highest + lowest)) <= 0.5 * share * (highest - lowest)
+
+
+def mean_where(values: Cycles, where: Bool[np.ndarray, "cycles points"]) -> Figures:
+    """Mean of each cycle over some of its samples; NaN where there is none."""
+    count = where.sum(axis=1)
+    sums = np.where(where, values, 0.0).sum(axis=1)
+    return np.divide(sums, count, out=np.full(len(values), np.nan), where=count > 0)
+
+
+def mean_in_bins(bins: np.ndarray, values: np.ndarray, number: int) -> Float[np.ndarray, " bins"]:
+    """Mean of the values in each of so many bins, given the bin of each value; NaN in an empty one."""
+    count, sums = np.bincount(bins, minlength=number), np.bincount(bins, values, minlength=number)
+    return np.divide(sums, count, out=np.full(number, np.nan), where=count > 0)
+
+
+def mean_curve(
+    x: np.ndarray, values: np.ndarray, low: float, high: float, number: int
+) -> tuple[Float[np.ndarray, " bins"], Float[np.ndarray, " bins"]]:
+    """Middles of equal bins of a range, and the mean of the values whose x is there; NaN in empty bins."""
+    bins = np.minimum(((x - low) / (high - low) * number).astype(int), number - 1)
+    return low + (np.arange(number) + 0.5) / number * (high - low), mean_in_bins(bins, values, number)

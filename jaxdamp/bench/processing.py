@@ -8,11 +8,10 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, NamedTuple, final
 
 import numpy as np
-from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._traced import of_known_numbers
-from jaxdamp.bench.motion import Samples, moving_span
+from jaxdamp.bench.motion import moving_span
 
 
 if TYPE_CHECKING:
@@ -104,11 +103,9 @@ class Origin(NamedTuple):
 def processed(raw: "BenchRun", steps: Steps) -> "BenchRun":
     """A record of the raw one, with all steps done and named in its notes."""
     for name in ("delay", "low_pass", "between"):
-        if raw.of_points and getattr(steps, name) is not None:
+        if raw.of_points and (given := getattr(steps, name)) is not None:
             remedy = "The points of a force-velocity table have no time: leave it out."
-            _checks.refuse(
-                name, "be asked for of records over time", f"{getattr(steps, name)} for {raw.name!r}", remedy
-            )
+            _checks.refuse(name, "be asked for of records over time", f"{given} for {raw.name!r}", remedy)
     run = replace(raw)
     if steps.delay is not None:
         run = _align(run, float(steps.delay))
@@ -230,21 +227,17 @@ def _subtract(run: "BenchRun", found: "GasAndFriction") -> "BenchRun":
 
 
 def _mean_cycle(run: "BenchRun") -> "BenchRun":
-    """The mean cycle at equal steps of time."""
     from jaxdamp.bench.analysis import fold_cycles
 
     if run.command_channel is not None:
         remedy = "Leave `mean_cycle` out, or cut the part in which the command is held."
-        _checks.refuse(
-            "mean_cycle", "be asked for where all cycles are alike", f"{run.name!r}, whose command varies", remedy
-        )
+        must = "be asked for where all cycles are alike"
+        _checks.refuse("mean_cycle", must, f"{run.name!r}, whose command varies", remedy)
     cycles = fold_cycles(run)
     count, period = len(cycles.periods), float(cycles.periods.mean())
     points = cycles.force.shape[1]
     time = np.arange(points) * (period / points)
-    channels: dict[str, Float[np.ndarray, " time"] | Samples] = {
-        name: getattr(cycles, name).mean(axis=0) for name in CHANNELS
-    }
+    channels = {name: getattr(cycles, name).mean(axis=0) for name in CHANNELS}
     warm = None
     if run.temperature is not None:
         during = (run.time >= cycles.starts[0]) & (run.time < cycles.starts[-1] + cycles.periods[-1])

@@ -1,15 +1,18 @@
-"""One record of a file as it was stored, before anything is known of its columns; all its problems in one message."""
+"""Records of a file as they were stored, before anything is known of their columns; all problems in one message."""
 
+import importlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import final
+from types import ModuleType
+from typing import Any, NamedTuple, TypeAlias, final
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
+from jaxdamp.bench.headers import role_of
 
 
 @final
@@ -47,6 +50,12 @@ class RawColumn:
         else:
             _checks.refuse(f"values of column {self.name!r}", "be numbers, text or dates", _checks.described(values))
         object.__setattr__(self, "values", values)
+
+    def _rows(self, rows: slice) -> "RawColumn":
+        """Some of the samples."""
+        start, stop, _ = rows.indices(len(self.values))
+        faults = {row - start: text for row, text in self.faults.items() if start <= row < stop}
+        return replace(self, values=self.values[rows], faults=faults)
 
     @property
     def is_text(self) -> bool:
@@ -147,14 +156,94 @@ class Problems:
 
 
 class Several(ArgumentError):
-    """Several errors in one message.
-
-    Attributes:
-        errors: each of them.
-    """
+    """Several errors in one message."""
 
     def __init__(self, errors: Sequence[Exception], remedy: str = "", *settings: Setting) -> None:
         lines = [f"  {number}. {error}" for number, error in enumerate(errors, 1)] + [remedy] * bool(remedy)
         named = [setting for error in errors for setting in getattr(error, "settings", ())]
         super().__init__("\n".join([f"{len(errors)} problems:", *lines]), *named, *settings)
         self.errors = tuple(errors)
+
+
+Untyped: TypeAlias = Any  # an object of a library that states no types
+
+
+def library(module: str, file: Path) -> ModuleType:
+    """A library that only this format needs."""
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise ImportError(
+            f"{file}: {file.suffix} files need the library {module.split('.')[0]!r}. Install it with "
+            "pip install 'jaxdamp[io]', or export the record as CSV."
+        ) from error
+
+
+def in_words(value: object) -> str:
+    """A value of a column that is a number or a name."""
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+class Clock(NamedTuple):
+    """The uniform instants of a channel: the first one and the step, both in seconds."""
+
+    start: float
+    step: float
+
+
+def tables_by_clock(
+    file: Path,
+    record: str,
+    columns: Sequence[RawColumn],
+    clocks: Sequence[Clock | None] = (),
+    notes: Sequence[str] = (),
+) -> list[RawTable]:
+    """The channels of a record as tables of its name, one for each number of samples and clock; none if no two fit.
+
+    The table with most channels is the first, the others are to be brought onto its clock (`record_tables`). Channels
+    without a clock have that of the others of their length, if it is only one, and a channel of the time wins over it.
+    """
+    tables = [
+        RawTable(file, tuple(group), record, notes=tuple(notes))
+        for group in _groups(columns, [*clocks] or [None] * len(columns))
+    ]
+    tables.sort(key=lambda table: (len(table.columns), len(table)), reverse=True)
+    return tables if tables and len(tables[0].columns) > 1 else []
+
+
+def _groups(columns: Sequence[RawColumn], clocks: Sequence[Clock | None]) -> list[list[RawColumn]]:
+    """The channels of each number of samples and clock, with the instants of the clock."""
+    lengths = [len(column.values) for column in columns]
+    timed = {n for n, column in zip(lengths, columns, strict=True) if _is_time(column)}
+    known = {count: {c for n, c in zip(lengths, clocks, strict=True) if n == count and c} for count in lengths}
+    groups: dict[tuple[int, Clock | None], list[RawColumn]] = {}
+    for column, count, clock in zip(columns, lengths, clocks, strict=True):
+        if count in timed:
+            clock = None
+        elif len(known[count]) == 1:
+            (clock,) = known[count]
+        groups.setdefault((count, clock), []).append(column)
+    for (count, clock), group in groups.items():
+        if clock is not None:
+            group.insert(1, RawColumn("time", clock.start + clock.step * np.arange(count), "s"))
+    return list(groups.values())
+
+
+def _is_time(column: RawColumn) -> bool:
+    """Whether a channel holds the instants of others: it is named so, and increases."""
+    rises = column.is_text or bool(np.all(np.diff(np.asarray(column.values)) > 0))
+    return rises and role_of(column.name, column.unit) == "time"
+
+
+def alone(tables: list[RawTable]) -> list[RawTable]:
+    """The tables of a file; the record that is the only one of its file needs no name."""
+    return [replace(table, record="") for table in tables] if len({table.record for table in tables}) == 1 else tables
+
+
+def apart(names: Sequence[str]) -> list[str]:
+    """Names with a number behind those that are there several times.
+
+    >>> apart(["cold", "warm", "warm"])
+    ['cold', 'warm 2', 'warm 3']
+    """
+    return [f"{name} {number}".strip() if names.count(name) > 1 else name for number, name in enumerate(names, 1)]

@@ -18,14 +18,13 @@ from jaxdamp.bench.bench_tables import Interpretation, bench_runs
 from jaxdamp.bench.clock import FEWEST
 from jaxdamp.bench.columns import Choice, is_record, lacking
 from jaxdamp.bench.manifest import BENCH_KEYS, RIDE_KEYS, Paths, with_manifest
-from jaxdamp.bench.one_clock import main_tables, on_one_clock, one_record
 from jaxdamp.bench.raw import Problems, RawTable
 from jaxdamp.bench.readers import BENCH_FILES, FILES, BenchFiles, Files, read_tables, with_own
+from jaxdamp.bench.record_tables import main_tables, on_one_clock, one_record, tests_apart
 from jaxdamp.bench.ride_record import RideInterpretation, RideRecord, ride_record
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import BenchSet
 from jaxdamp.bench.settings import Settings, settings_by_name, settings_in_names
-from jaxdamp.bench.several_tests import tests_apart
 
 
 Command = float | int | str | Mapping[str, float | int]  # one number, one for each record, or a setting
@@ -99,7 +98,7 @@ def read(
     given: Contents = {"sign": sign, "force_sign": force_sign, "command": command, "settings": settings, **files}
     asked, given, note = with_manifest(paths, manifest, given, BENCH_KEYS)
     signs.check_words(given["sign"], given["force_sign"])
-    tables = ({**(given[name] or {})} for name in ("columns", "units", "gains"))
+    tables = (given[name] or {} for name in ("columns", "units", "gains"))
     choice = Choice(*tables, stroke_from_velocity=bool(given["stroke_from_velocity"]))
     how = Interpretation(choice, given["sign"], given["force_sign"], given["sampling_rate"], drop_bad_rows)
     runs, wrong, file_names = _read_files(asked, given, partial(_bench_runs, how=how))
@@ -262,21 +261,15 @@ def _with_settings(
 ) -> list[tuple[str, BenchRun]]:
     names = [base for base, _ in runs]
     table, notes = (settings_by_name(names, settings), {}) if settings is not None else settings_in_names(names)
-    return [
-        (
-            base,
-            replace(
-                run,
-                settings={**table[base], **run.settings, **({} if settings is None else table[base])},
-                notes=(*run.notes[:-1], *notes.get(base, ()), *run.notes[-1:]),
-            ),
-        )
-        for base, run in runs
-    ]
+    completed = []
+    for base, run in runs:
+        stated = {**table[base], **run.settings, **({} if settings is None else table[base])}
+        said = (*run.notes[:-1], *notes.get(base, ()), *run.notes[-1:])
+        completed.append((base, replace(run, settings=stated, notes=said)))
+    return completed
 
 
 def _commanded(runs: list[tuple[str, BenchRun]], command: Command | None) -> list[BenchRun]:
-    """The records with the commands given."""
     if command is None:
         return [run for _, run in runs]
     if isinstance(command, str):
@@ -295,7 +288,6 @@ def _held(run: BenchRun, command: float | int) -> BenchRun:
 
 
 def _check_patterns(command: Mapping[str, float | int], patterns: Mapping[str, Sequence[str]]) -> None:
-    """Refuse commands for no record, and records with none or several commands."""
     fitting = {key for keys in patterns.values() for key in keys}
     unused = ", ".join(repr(key) for key in command if key not in fitting)
     if unused:
@@ -307,7 +299,6 @@ def _check_patterns(command: Mapping[str, float | int], patterns: Mapping[str, S
 
 
 def _setting(run: BenchRun, name: str) -> float:
-    """The setting of a record that is its command."""
     value = run.settings.get(name)
     if not isinstance(value, int | float):
         settings = ", ".join(f"{key}={value!r}" for key, value in run.settings.items()) or "none"

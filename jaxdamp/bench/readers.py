@@ -71,12 +71,7 @@ def with_own(readers: Mapping[str, Reader] | None) -> dict[str, Reader]:
 
 
 def read_tables(file: Path, readers: Mapping[str, Reader], delimiter: str | None = None) -> list[RawTable]:
-    """The records of a file as they are stored. A file with an unknown suffix is read as text.
-
-    Raises:
-        ValueError: the file is damaged, of another format, or holds no record.
-        ImportError: the library for this format is missing.
-    """
+    """The records of a file as they are stored. A file with an unknown suffix is read as text."""
     reader = readers.get(file.suffix.lower(), read_text)
     if reader is read_text:
         return read_text(file, delimiter)

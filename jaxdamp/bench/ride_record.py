@@ -13,11 +13,11 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._tables import Contents, plain
-from jaxdamp.bench import clock, stamps
+from jaxdamp.bench import clock
 from jaxdamp.bench.columns import Choice, find_one, given_column
 from jaxdamp.bench.headers import split_header
 from jaxdamp.bench.motion import Samples
-from jaxdamp.bench.raw import RawTable
+from jaxdamp.bench.raw import RawColumn, RawTable
 from jaxdamp.bench.units import ratio
 
 
@@ -177,13 +177,9 @@ class RideInterpretation:
     reversed_channels: Sequence[str] | None = None
     sampling_rate: float | int | None = None
 
-    def unit(self, channel: str) -> str | None:
-        """The unit that the caller gives a channel."""
-        return (self.units or {}).get(channel)
-
-    def sign(self, channel: str) -> float:
-        """-1 for a channel that the file counts the other way."""
-        return -1.0 if channel in (self.reversed_channels or ()) else 1.0
+    def unit(self, channel: str, column: RawColumn) -> str | None:
+        """The unit of a channel: that given, or that of its column."""
+        return (self.units or {}).get(channel) or column.unit or split_header(column.name)[1]
 
     def check_names(self, channels: Mapping[str, int]) -> None:
         """Refuse units and signs of channels that are not read."""
@@ -192,11 +188,7 @@ class RideInterpretation:
 
 
 def ride_record(table: RawTable, name: str, how: RideInterpretation) -> RideRecord:
-    """The record of a table.
-
-    Raises:
-        ValueError: a column that is missing, doubtful, without a unit, or holds something else than numbers.
-    """
+    """The record of a table."""
     headers = [split_header(column.name)[0] for column in table.columns]
     roads = [given_column(table, ROAD, which, "road") for which in _road_columns(table, headers, how.road)]
     at = _time_column(table, headers, how)
@@ -227,16 +219,12 @@ def ride_record(table: RawTable, name: str, how: RideInterpretation) -> RideReco
 
 
 def _settings(table: RawTable) -> dict[str, float | int | str]:
-    """The settings in a file that the library wrote."""
     lines = [line.removeprefix(RIDE_SETTINGS_MARK) for line in table.preamble if line.startswith(RIDE_SETTINGS_MARK)]
     return json.loads(lines[0]) if lines and table.preamble[0].strip() == RIDE_MARK else {}
 
 
 def _channels(
-    table: RawTable,
-    headers: Sequence[str],
-    columns: Mapping[str, str | int] | None,
-    others: set[int],
+    table: RawTable, headers: Sequence[str], columns: Mapping[str, str | int] | None, others: set[int]
 ) -> dict[str, int]:
     """Number of the column of each channel: those asked for, or all that have a name but for road and time."""
     if columns is None:
@@ -247,7 +235,6 @@ def _channels(
 def _road_columns(
     table: RawTable, headers: Sequence[str], road: Sequence[str | int] | str | int | None
 ) -> list[str | int]:
-    """Headers or numbers of the columns of the road."""
     if road is not None:
         return [road] if isinstance(road, str | int) else list(road)
     numbered = f"{ROAD} "
@@ -265,14 +252,15 @@ def _values(table: RawTable, index: int, channel: str, how: RideInterpretation) 
     if raw.faults or raw.is_text:
         row, text = min(raw.faults.items()) if raw.faults else (0, str(raw.values[0]))
         raise ValueError(f"{where}, {table.place(row)}: {text!r} is not a number. Mend or remove the line.")
-    written = how.unit(channel) or raw.unit or split_header(raw.name)[1]
+    written = how.unit(channel, raw)
     if not written:
         raise ValueError(f"{where}: no unit. Write it into the header, or pass `units={{{channel!r}: 'm/s^2'}}`.")
     units = tuple(ROAD_UNITS.values()) if channel == ROAD else SI_UNITS
     factor, unit = _to_si(written, units)
     if factor is None:
         raise ValueError(f"{where}: {written!r} is no unit of {channel!r}; it must be one of {', '.join(units)}.")
-    return how.sign(channel) * factor * np.asarray(raw.values, np.float64), unit
+    sign = -1.0 if channel in (how.reversed_channels or ()) else 1.0
+    return sign * factor * np.asarray(raw.values, np.float64), unit
 
 
 def _to_si(written: str, units: Sequence[str]) -> tuple[float | None, str]:
@@ -290,20 +278,18 @@ def _time_column(table: RawTable, headers: Sequence[str], how: RideInterpretatio
 
 
 def _time(table: RawTable, index: int | None, how: RideInterpretation) -> Samples:
-    """The instants [s]."""
     rate = how.sampling_rate
     if index is None:
         if rate is None:
             raise ValueError(f"{table.where} has no column `time`: pass `sampling_rate` [Hz], or name it in `columns`.")
         return clock.uniform_time(rate, len(table))
     if rate is not None:
-        remedy = "leave `sampling_rate` out."
-        raise ValueError(f"{table.where} has a column of time, {table.names[index]!r}: {remedy}")
+        raise ValueError(f"{table.where} has a column of time, {table.names[index]!r}: leave `sampling_rate` out.")
     raw = table.columns[index]
     where = f"{table.where}, column {table.names[index]!r}"
     if raw.is_text:
-        return stamps.seconds(np.asarray(raw.values), where, table.place)[0]
-    written = how.unit("time") or raw.unit or split_header(raw.name)[1]
+        return clock.seconds(np.asarray(raw.values), where, table.place)[0]
+    written = how.unit("time", raw)
     factor = ratio(written, "s") if written else None
     if factor is None:
         raise ValueError(f"{where}: {written or 'no unit'} instead of a unit of time; pass `units={{'time': 's'}}`.")

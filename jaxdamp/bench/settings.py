@@ -23,16 +23,9 @@ _RECUR = 0.3  # share of the pairs of one motion that contradict, from which sev
 
 
 def settings_by_name(names: Sequence[str], given: str | Mapping[str, Settings]) -> dict[str, dict]:
-    """The settings of each record.
+    """The settings of each record by pattern, in which `{name}` stands for a value in the record's name.
 
-    Arguments:
-        names: of the records.
-        given: pattern to settings; `{name}` in a pattern stands for a value in the record's name. A pattern alone is
-            one without further settings, which all records must fit.
-
-    Raises:
-        ValueError: a pattern that no record fits, a record that does not fit a pattern given alone, or one setting
-            with two values.
+    A pattern alone is one without further settings, which all records must fit.
 
     >>> settings_by_name(["5mm_0.5A", "5mm_1A"], "*_{current}A")
     {'5mm_0.5A': {'current': 0.5}, '5mm_1A': {'current': 1.0}}
@@ -47,10 +40,8 @@ def settings_by_name(names: Sequence[str], given: str | Mapping[str, Settings]) 
         fitting = {name: match for name in names if (match := expression.fullmatch(name))}
         missing = [name for name in names if name not in fitting]
         if not fitting or (missing and isinstance(given, str)):
-            records = ", ".join(missing[:8])
-            _checks.refuse(
-                "settings", "have patterns that fit the records", repr(pattern), f"It does not fit {records}."
-            )
+            remedy = f"It does not fit {', '.join(missing[:8])}."
+            _checks.refuse("settings", "have patterns that fit the records", repr(pattern), remedy)
         for name, match in fitting.items():
             _add(settings[name], {**values, **{key: _value(text) for key, text in match.groupdict().items()}}, name)
     return settings

@@ -99,10 +99,6 @@ def decide(
     """How the channels of a file have to be turned, by what is given (as for `bench.read`) and by the work.
 
     `headers` are those of stroke and velocity, which may state what is not given, such as "compression travel".
-
-    Raises:
-        ValueError: what is given contradicts the work or a header, or nothing is given and the work is too small to
-            decide.
     """
     check_words(sign, force_sign)
     stated, header = _stated(headers, sign, where)

@@ -19,7 +19,7 @@ _FAST_SHARE, _REPEATED_SHARE = 0.01, 0.003  # of the stroke, above which what is
 _REPEATS = 0.9  # of the power of the slow motion in what is the same in all cycles
 _STANDS_OUT = 20.0  # power of a tone, relative to that beside it
 _BESIDE = 64  # lines of the spectrum that are beside each other
-_MAINS = (50.0, 60.0)  # Hz
+MAINS = (50.0, 60.0)  # Hz
 _JUMP = 6.0  # a step from sample to sample, relative to the RMS of all
 _SAID = 0.02  # of the velocity, above which ripple that is left out is named
 
@@ -51,8 +51,9 @@ def spectrum_of(time: Samples, stroke: Samples, frequency: float) -> Spectrum:
     frequencies = np.fft.rfftfreq(count, 1 / rate)
     floor = float(np.median(power[len(power) // 2 :])) / np.log(2)
     seen, slow = power > 10 * floor, frequencies < _SLOW * frequency
-    fast = seen & ~slow & ~np.any([_near_multiples(frequencies, mains) for mains in _MAINS], axis=0)
-    fast &= not _jumps(stroke)
+    fast = seen & ~slow & (not _jumps(stroke))
+    for mains in MAINS:  # three lines to either side of its multiples
+        fast &= np.abs((frequencies + 0.5 * mains) % mains - 0.5 * mains) > 3 * (frequencies[1] - frequencies[0])
     share = _FAST_SHARE
     if np.any(fast):
         slow_repeats, fast_repeats = _repeating(time, stroke)
@@ -106,9 +107,3 @@ def _jumps(stroke: Samples) -> bool:
     largest = int(np.argmax(steps))
     turn = np.max(np.abs(np.diff(stroke[max(largest - 1, 0) : largest + 3], 2)), initial=0.0)
     return bool(steps[largest] > _JUMP * np.sqrt(np.mean(steps**2)) and turn > 0.5 * steps[largest])
-
-
-def _near_multiples(frequencies: Float[np.ndarray, " lines"], base: float) -> Bool[np.ndarray, " lines"]:
-    """Which lines are within three of a multiple of a frequency [Hz]."""
-    width = 3 * (frequencies[1] - frequencies[0])
-    return np.abs((frequencies + 0.5 * base) % base - 0.5 * base) <= width

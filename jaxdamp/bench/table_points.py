@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ from jaxdamp._files import natural_key
 from jaxdamp.bench import sign as signs
 from jaxdamp.bench.columns import Choice, find_one, in_si
 from jaxdamp.bench.headers import COMPRESSION, REBOUND, role_of, split_header, tail_unit
-from jaxdamp.bench.raw import Problems, RawColumn, RawTable
+from jaxdamp.bench.raw import Problems, RawTable, in_words
 from jaxdamp.bench.settings import settings_in_name
 
 
@@ -29,19 +29,12 @@ Points = Float[np.ndarray, " points"]
 
 
 class Curve(NamedTuple):
-    """The points of one setting.
+    """The points of one setting."""
 
-    Attributes:
-        setting: its name, such as "4" for a click; empty if there is only one.
-        command: its number; None where the name has none.
-        velocity: increasing [m/s], positive in rebound.
-        force: [N], positive when it resists extension.
-    """
-
-    setting: str
-    command: float | None
-    velocity: Points
-    force: Points
+    setting: str  # its name, such as "4" for a click; empty if there is only one
+    command: float | None  # its number; None where the name has none
+    velocity: Points  # increasing [m/s], positive in rebound
+    force: Points  # [N], positive when it resists extension
 
 
 class Side(NamedTuple):
@@ -57,15 +50,6 @@ class Side(NamedTuple):
     where: str
     file: Path
     by_name: bool = False
-
-
-@dataclass(frozen=True)
-class How:
-    """What the caller says about the files."""
-
-    choice: Choice
-    sign: str | None
-    side: str | None
 
 
 def stated_sign(table: RawTable) -> str | None:
@@ -88,12 +72,10 @@ def with_headers(table: RawTable) -> RawTable:
     """The table with the numbers in its first row as headers, where the other cells of that row are words."""
     if table.is_named or not any(0 in column.faults and column.faults[0] for column in table.columns):
         return table
-    columns = []
-    for column in table.columns:
-        head = column.faults.get(0, "") or f"{np.asarray(column.values)[0]:g}"
-        faults = {row - 1: text for row, text in column.faults.items() if row}
-        columns.append(RawColumn(head, np.asarray(column.values)[1:], column.unit, faults))
-    return replace(table, columns=tuple(columns), lines=table.lines[1:])
+    heads = (column.faults.get(0, "") or f"{np.asarray(column.values)[0]:g}" for column in table.columns)
+    below = (column._rows(slice(1, None)) for column in table.columns)
+    columns = tuple(replace(column, name=head) for column, head in zip(below, heads, strict=True))
+    return replace(table, columns=columns, lines=table.lines[1:])
 
 
 def _words(text: str) -> list[str]:
@@ -156,20 +138,20 @@ def _column_of_words(table: RawTable, wanted: set[str], besides: Sequence[int]) 
     return next(named, None)
 
 
-def sides_of(table: RawTable, how: How) -> tuple[list[Side], list[str]]:
+def sides_of(table: RawTable, choice: Choice) -> tuple[list[Side], list[str]]:
     """The points of every column of forces, in SI, and notes."""
-    at = find_one(table, "velocity", how.choice)
+    at = find_one(table, "velocity", choice)
     assert at is not None
-    forces = list(_forces(table, at, how.choice))
+    forces = list(_forces(table, at, choice))
     clicks = _column_of_words(table, _SETTING, [at])
     forces = [index for index in forces if index != clicks]
     words = _column_of_words(table, _DIRECTION, [at, *forces])
-    velocity, unit = in_si(table, at, "velocity", how.choice)
+    velocity, unit = in_si(table, at, "velocity", choice)
     units, found, problems, missing = {"velocity": unit}, [], Problems(), 0
     of_name = _direction_of_name(table, velocity)
     for index in forces:
         with problems.collected():
-            force, units["force"] = in_si(table, index, "force", how.choice)
+            force, units["force"] = in_si(table, index, "force", choice)
             there = np.isfinite(velocity) & np.isfinite(force)
             missing += int(np.sum(~there))
             of_header = _direction(table.names[index])
@@ -178,7 +160,7 @@ def sides_of(table: RawTable, how: How) -> tuple[list[Side], list[str]]:
                 direction = np.array([_direction(str(cell)) for cell in table.columns[words].values], dtype=float)
             settings = np.full(len(velocity), _setting(table.names[index]) or _setting(table.record), dtype=object)
             if clicks is not None:
-                settings = np.array([_cell(value) for value in table.columns[clicks].values], dtype=object)
+                settings = np.array([in_words(value) for value in table.columns[clicks].values], dtype=object)
             where = f"{table.where}, column {table.names[index]!r}"
             for setting in dict.fromkeys(settings.tolist()):
                 rows = there & (settings == setting)
@@ -190,15 +172,11 @@ def sides_of(table: RawTable, how: How) -> tuple[list[Side], list[str]]:
     return found, [f"a force-velocity table: {read}; brought to SI", *lost, *table.notes]
 
 
-def _cell(value: object) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def curves_of(sides: Sequence[Side], how: How) -> tuple[tuple[Curve, ...], list[str]]:
-    """The points by setting, both directions joined, and notes."""
+def curves_of(sides: Sequence[Side], sign: str | None, half: str | None) -> tuple[tuple[Curve, ...], list[str]]:
+    """The points by setting, both directions joined, and notes; `sign` and `half` are `sign` and `side` as given."""
     notes: list[str] = []
     points: Directions = {1: {}, -1: {}}
-    for direction, side in _apart(_halves(sides, how, notes)):
+    for direction, side in _apart(_halves(sides, sign, half, notes)):
         points[direction].setdefault(side.setting, []).append(np.stack([side.velocity, side.force]))
     for direction, word in ((1, "rebound"), (-1, "compression")):
         if not points[direction]:
@@ -212,14 +190,14 @@ def curves_of(sides: Sequence[Side], how: How) -> tuple[tuple[Curve, ...], list[
         raise ValueError(f"{sides[0].where}: {', '.join(map(repr, lacking))} is there in one direction only.")
     curves = [_curve(name, [*points[-1][name], *points[1][name]], notes) for name in names]
     notes += [f"{len(curves)} settings, by columns, rows, sheets or files: {', '.join(names)}"] * (len(curves) > 1)
-    return tuple(sorted(curves, key=_command)), notes
+    return tuple(sorted(curves, key=lambda curve: np.inf if curve.command is None else curve.command)), notes
 
 
-def _halves(sides: Sequence[Side], how: How, notes: list[str]) -> list[tuple[int, Side]]:
+def _halves(sides: Sequence[Side], sign: str | None, half: str | None, notes: list[str]) -> list[tuple[int, Side]]:
     """The points in rebound (1) and in compression (-1) of each column, positive in rebound."""
     halves = []
     for side in sides:
-        velocity, force = _oriented(side, how, notes)
+        velocity, force = _oriented(side, sign, half, notes)
         for direction, there in ((1, ~np.signbit(velocity)), (-1, np.signbit(velocity))):  # −0.0 is of compression
             if there.any():
                 halves.append((direction, side._replace(velocity=velocity[there], force=force[there])))
@@ -266,10 +244,6 @@ def _once(side: Side, direction: int, first: str) -> None:
     )
 
 
-def _command(curve: Curve) -> float:
-    return np.inf if curve.command is None else curve.command
-
-
 def _rest(points: Directions, notes: list[str]) -> None:
     """A point of no force at zero velocity, for settings that have none there."""
     for setting, parts in points[1].items():
@@ -296,9 +270,10 @@ def _curve(name: str, parts: Sequence[np.ndarray], notes: list[str]) -> Curve:
     return Curve(name, float(name) if number else None, unique, np.bincount(place.ravel(), force) / count)
 
 
-def _oriented(side: Side, how: How, notes: list[str]) -> tuple[Points, Points]:
+def _oriented(side: Side, sign: str | None, half: str | None, notes: list[str]) -> tuple[Points, Points]:
     """Velocity and force of a column, positive in rebound; a refusal where the file does not tell the direction."""
-    velocity, force, factor = side.velocity, side.force, -1.0 if how.sign == "compression-positive" else 1.0
+    velocity, force = side.velocity, side.force
+    factor, way = (-1.0, "compression") if sign == "compression-positive" else (1.0, "rebound")
     both = bool(np.any(force < 0.0) and np.any(force > 0.0))
     if np.all(side.direction != 0.0):
         if any(np.ptp(np.sign(force[(side.direction == d) & (force != 0.0)])) > 0 for d in set(side.direction)):
@@ -311,30 +286,26 @@ def _oriented(side: Side, how: How, notes: list[str]) -> tuple[Points, Points]:
         notes.append("rebound and compression as headers or names say")
         return np.abs(velocity) * side.direction, np.abs(force) * side.direction
     if np.any(velocity < 0.0):
-        signs.require(how.sign, side.where, "velocities", "file")
+        signs.require(sign, side.where, "velocities", "file")
         velocity = factor * velocity
         if not both:
-            notes.append(f"positive velocity is {_positive(how)}; forces are magnitudes")
+            notes.append(f"positive velocity is {way}, as it was said; forces are magnitudes")
             return velocity, np.abs(force) * np.sign(velocity)
         same = float(np.dot(force, velocity)) >= 0.0
         agree = "resists motion in that direction" if same == (factor > 0) else "is counted the other way"
-        notes.append(f"positive velocity is {_positive(how)}; the force {agree}, because a damper takes in energy")
+        notes.append(f"positive velocity is {way}, as it was said; the force {agree}, because a damper takes in energy")
         return velocity, force if same else -force
     if both:
-        signs.require(how.sign, side.where, "forces", "file")
-        notes.append(f"positive force is {_positive(how)}")
+        signs.require(sign, side.where, "forces", "file")
+        notes.append(f"positive force is {way}, as it was said")
         return velocity * np.sign(force) * factor, factor * force
-    if how.side is None:
+    if half is None:
         _refuse_half(side.where)
-    notes.append(f"{how.side}, as it was said")
-    if how.side == "symmetric":
+    notes.append(f"{half}, as it was said")
+    if half == "symmetric":
         return np.concatenate([-velocity, velocity]), np.concatenate([-np.abs(force), np.abs(force)])
-    direction = 1.0 if how.side == "rebound" else -1.0
+    direction = 1.0 if half == "rebound" else -1.0
     return direction * velocity, direction * np.abs(force)
-
-
-def _positive(how: How) -> str:
-    return "compression, as it was said" if how.sign == "compression-positive" else "rebound, as it was said"
 
 
 def _refuse_half(where: str, missing: str = "") -> None:

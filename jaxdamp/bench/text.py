@@ -11,7 +11,6 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
 from jaxdamp._files import check_size
-from jaxdamp.bench.blocks import blocks_of, named_apart, title
 from jaxdamp.bench.headers import role_of
 from jaxdamp.bench.layout import (
     DELIMITERS,
@@ -21,11 +20,14 @@ from jaxdamp.bench.layout import (
     Header,
     Layout,
     Rows,
+    blocks_of,
     columns_of,
     header_of,
     is_number,
     layout_of,
+    named_apart,
     split,
+    title,
 )
 from jaxdamp.bench.raw import RawColumn, RawTable
 
@@ -53,10 +55,6 @@ def read_text(file: Path, delimiter: str | None = None) -> list[RawTable]:
     of numbers and time stamps. The comma is the decimal sign where it is not the delimiter and no number has a point.
     The header is the last line without a number above the first row of numbers; a row of units may stand between the
     two. Lines of another form behind the last row of numbers are left out, and a note counts them.
-
-    Raises:
-        ValueError: naming file, line and value if the file is empty, has one column only, a wrong delimiter, rows of
-            different lengths or two decimal signs.
     """
     lines = text_lines(file)
     if delimiter is not None and len(delimiter) != 1:
@@ -100,7 +98,6 @@ def _check_commas(file: Path, rows: Rows, header: Header, layout: Layout) -> Non
 
 
 def _table(file: Path, lines: list[str], first: int, layout: Layout, header: Header) -> RawTable:
-    """The table of the lines from number `first` on."""
     numbers, body, notes = _body(lines, first, layout)
     columns = _all_at_once(body, layout)
     if columns is None:
@@ -172,7 +169,6 @@ def _grouped(top: list[tuple[int, str]]) -> str:
 
 
 def _divides(delimiter: str, top: list[tuple[int, str]]) -> bool:
-    """Whether any line has several cells with this delimiter."""
     return any(len(line.split()) > 1 if delimiter == " " else delimiter in line for _, line in top)
 
 
@@ -240,7 +236,6 @@ def _with_points(body: list[str]) -> list[str]:
 
 
 def _in_chunks(body: list[str], delimiter: str, count: int) -> Iterator[list[list[str]]]:
-    """The cells of some lines at a time."""
     for start in range(0, len(body), _CHUNK):
         lines = body[start : start + _CHUNK]
         rows = [split(line, delimiter) for line in lines]

@@ -17,13 +17,7 @@ from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import clock
-from jaxdamp.bench.motion import (
-    Samples,
-    cycle_instants,
-    dominant_frequency,
-    savitzky_golay,
-    savitzky_golay_weights,
-)
+from jaxdamp.bench.motion import Samples, cycle_instants, dominant_frequency, savitzky_golay, savitzky_golay_weights
 from jaxdamp.bench.spectrum import Spectrum, spectrum_of
 
 
@@ -122,7 +116,6 @@ def _least_squares(basis: Float[np.ndarray, "time columns"], values: Samples) ->
 def _derivative(
     basis: Float[np.ndarray, "time columns"], omega: float, coefficients: Float[np.ndarray, " columns"]
 ) -> Samples:
-    """Time derivative of the fitted wave."""
     count = (len(coefficients) - 1) // 2
     order = omega * np.arange(1, count + 1)
     return basis[:, count + 1 :] @ (-order * coefficients[1 : count + 1]) + basis[:, 1 : count + 1] @ (

@@ -178,17 +178,30 @@ class VirtualDyno:
         return [[i for i, kind in enumerate(kinds) if kind == alike] for alike in dict.fromkeys(kinds)]
 
     def _readings(self, tests: list[Excitation]) -> tuple[list[Samples], Channels, Channels]:
-        """Fine grids [s] of tests with equal grids; there, force at the load cell [N] and temperature [K]."""
+        """Fine grids [s] of tests with equal grids; there, force at the load cell [N] and temperature [K].
+
+        They are `Rig.readings` in float64 whatever the session's precision, because the steps are microseconds.
+        """
         grids = []
         for test in tests:
             step, before, count = self._fine_grid(test)
             grids.append(step * np.arange(-before, count - before))
-        strokes = np.stack([test.stroke(grid) for test, grid in zip(tests, grids, strict=True)])
-        velocities = np.stack([test.velocity(grid) for test, grid in zip(tests, grids, strict=True)])
-        pairs = zip(tests, grids, strict=True)
+        pairs = [*zip(tests, grids, strict=True)]
+        time, velocity = np.stack(grids), np.stack([test.velocity(grid) for test, grid in pairs])
+        stroke = np.stack([test.stroke(grid) for test, grid in pairs])
         commands = [test.command(grid) for test, grid in pairs if isinstance(test, CommandedExcitation)]
-        command = np.stack(commands) if commands else None
-        force, temperature = _exact_readings(self.law, self.rig, np.stack(grids), strokes, velocities, command)
+        with jax.enable_x64(True):
+            given = self.law, self.rig
+            law, rig = jax.tree.map(lambda a: a.astype(np.float64) if eqx.is_inexact_array(a) else a, given)
+            stroke = stroke + float(rig.stroke_offset)
+            force = None if commands else _printed(law, rig, time, stroke, velocity)
+            temperature = np.full(time.shape, float(rig.reference_temperature))
+            if force is None:
+                command = np.stack(commands) if commands else None
+                channels = jax.tree.map(jax.numpy.asarray, (time, stroke, velocity, command))
+                readings = jax.vmap(lambda t, x, v, u: rig.readings(law, t, x, v, command=u))(*channels)
+                force, temperature = map(np.asarray, readings)
+        require_finite_force(self.law, force, "over the whole programme")
         return grids, force, temperature
 
     def _record(self, test: Excitation, grid: Samples, force: Samples, temperature: Samples) -> BenchRun:
@@ -231,26 +244,7 @@ class VirtualDyno:
 
 
 def _names(kind: type) -> list[str]:
-    """The fields of a class."""
     return [field.name for field in fields(kind)]
-
-
-def _exact_readings(
-    law: AbstractDamper, rig: Rig, time: Channels, stroke: Channels, velocity: Channels, command: Channels | None
-) -> tuple[Channels, Channels]:
-    """`Rig.readings` for several tests, in float64 whatever the session's precision: its steps are microseconds."""
-    with jax.enable_x64(True):
-        law_64, rig_64 = jax.tree.map(lambda a: a.astype(np.float64) if eqx.is_inexact_array(a) else a, (law, rig))
-        stroke = stroke + float(rig_64.stroke_offset)
-        printed = _printed(law_64, rig_64, time, stroke, velocity) if command is None else None
-        if printed is None:
-            channels = jax.tree.map(jax.numpy.asarray, (time, stroke, velocity, command))
-            readings = jax.vmap(lambda t, x, v, u: rig_64.readings(law_64, t, x, v, command=u))(*channels)
-            force, temperature = map(np.asarray, readings)
-        else:
-            force, temperature = printed, np.full(time.shape, float(rig_64.reference_temperature))
-    require_finite_force(law, force, "over the whole programme")
-    return force, temperature
 
 
 def _printed(law: AbstractDamper, rig: Rig, time: Channels, stroke: Channels, velocity: Channels) -> Channels | None:

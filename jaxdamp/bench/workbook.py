@@ -9,10 +9,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from jaxdamp.bench.blocks import Block, blocks_of, named_apart, title
-from jaxdamp.bench.layout import Header, Layout, columns_of, header_of, layout_of
-from jaxdamp.bench.raw import RawColumn, RawTable
-from jaxdamp.bench.raw_tables import alone, library
+from jaxdamp.bench.layout import Block, Header, Layout, blocks_of, columns_of, header_of, layout_of, named_apart, title
+from jaxdamp.bench.raw import RawColumn, RawTable, alone, library
 
 
 _LARGEST_SHEET, _LARGE, _INFLATION = 2**29, 2**26, 100  # bytes of a part of a workbook, and how often it may grow
@@ -58,7 +56,6 @@ def _check_inflation(file: Path) -> None:
 
 
 def _lacks_values(column: RawColumn) -> bool:
-    """Whether a column has cells without anything."""
     return "" in column.faults.values() or (column.is_text and "" in np.asarray(column.values))
 
 

@@ -66,8 +66,11 @@ def fit_vehicle(
         screen.points(remarks)
         guided, call = fit_arguments(car, rides, benches, how, guide)
         comparison = _compared(screen, guided, forms, rides, call) if forms else None
-        result = comparison.best.result if comparison else _fitted(screen, guided, rides, call)
-        if not comparison:
+        if comparison:
+            result = comparison.best.result
+        else:
+            with screen.stage("Fitting"):
+                result = identify.fit_vehicle(guided, rides, **call)
             screen.answer(f"{result.summary}.")
         screen.table(result.table())
         screen.details(result.scores_table())
@@ -86,11 +89,6 @@ def friction_forms(words: Sequence[str]) -> tuple[str, ...]:
     for word in words:
         _checks.one_of("friction", word, (*identify.FORMS, "all"))
     return identify.FORMS if "all" in words else tuple(dict.fromkeys(words))
-
-
-def _fitted(screen: Screen, car: AbstractVehicle, rides: Sequence[RideRecord], call: Arguments) -> VehicleFit:
-    with screen.stage("Fitting"):
-        return identify.fit_vehicle(car, rides, **call)
 
 
 def _compared(
@@ -127,7 +125,9 @@ def fit_arguments(
     guides = [guide_words(body, numbers, car) for body, numbers in guide]
     if guides:
         own = [f"guides.{i}.{name}" for i, (_, free) in enumerate(guides) for name in free]
-        held = [f"guides.{i}.{name}" for i, (guide, _) in enumerate(guides) for name in guide_paths(guide)]
+        friction = ["law.friction_force", "law.friction_velocity"]
+        numbers = [["stiffness", "damping", *friction * (guide.law is not None)] for guide, _ in guides]
+        held = [f"guides.{i}.{name}" for i, names in enumerate(numbers) for name in names]
         car = Guided(car, tuple(guide for guide, _ in guides))
         more["over"] = None if "over" not in given else [*given["over"], *own]
         more["freeze"] = [*given.get("freeze", ()), *[path for path in held if path not in own]]
@@ -160,11 +160,6 @@ def guide_words(body: str, numbers: Mapping[str, float], car: AbstractVehicle) -
     law = None if friction is None else CoulombFriction(friction, velocity)
     free = [name for name in numbers if name != "ahead"] + ["law.friction_force"] * (law is not None)
     return Guide(law, body, **numbers), free
-
-
-def guide_paths(guide: Guide) -> list[str]:
-    """The paths of all numbers of a guide."""
-    return ["stiffness", "damping"] + ["law.friction_force", "law.friction_velocity"] * (guide.law is not None)
 
 
 def bench_words(texts: Sequence[str], car: AbstractVehicle) -> dict[str, BenchSet]:

@@ -112,7 +112,7 @@ def in_command_line(text: str) -> str:
         text = re.sub(python, words, text)
     text = re.sub(r"Argument `([^`]+)`", lambda found: _argument(found[1]), text)
     text = re.sub(r"`(\w+)=([^`]*)`", lambda found: _setting(found) or found[0], text)
-    return re.sub(r"`(\w+)`", lambda found: _word_of(found[1]), text)
+    return re.sub(r"`(\w+)`", lambda found: own_words().get(found[1], found[0]).removeprefix("Option "), text)
 
 
 def _argument(argument: str) -> str:
@@ -130,11 +130,6 @@ def _setting(found: re.Match[str]) -> str:
     except (SyntaxError, ValueError):
         value = ...
     return option_text(Setting(found[1], value), words.removeprefix("Option ")) if words.startswith("Option ") else ""
-
-
-def _word_of(argument: str) -> str:
-    """An argument as the running command calls it; in quotes of code if it has none of this name."""
-    return own_words().get(argument, f"`{argument}`").removeprefix("Option ")
 
 
 def message(error: Exception) -> str:

@@ -194,3 +194,11 @@ def test_a_unit_is_proposed_only_where_it_is_near(written, hint):
         find_columns(_table("t", "x", "F", units=("s", "mm", written)))
     assert f"{written!r} is no known unit of force. {hint}Usual ones are N, kN" in str(refused.value)
     assert f'pass units={{"force": "{"lbf" if hint else "N"}"}}' in str(refused.value)
+
+
+@pytest.mark.parametrize("read", [bench.read, bench.read_table])
+@pytest.mark.parametrize(("name", "value"), [("columns", 5), ("units", ["mm"])])
+def test_columns_that_are_no_mapping_are_refused_by_name(tmp_path, read, name, value):
+    (tmp_path / "a.csv").write_text("time [s],stroke [m],force [N]\n0,0,1\n")
+    with pytest.raises(ValueError, match=f"`{name}` must be a mapping of quantities.*Write a dictionary"):
+        read(tmp_path / "a.csv", **{name: value})

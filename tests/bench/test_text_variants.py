@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from jaxdamp.bench import read
-from jaxdamp.bench.stamps import is_stamp, seconds
+from jaxdamp.bench.clock import is_stamp, seconds
 
 
 T = np.arange(600) / 300

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from jaxtyping import Float
@@ -11,7 +11,7 @@ from jaxdamp._display import plus_minus
 from jaxdamp._tables import Cell, Shown
 from jaxdamp.bench.analysis import FoldedCycles
 from jaxdamp.bench.contradictions import repeats
-from jaxdamp.bench.peaks import CENTRAL, Cycles, Figures, around_middle, at_peak, mean_where, speed_is_constant
+from jaxdamp.bench.motion import CENTRAL, Cycles, Figures, around_middle, at_peak, mean_where, speed_is_constant
 from jaxdamp.bench.runs import BenchRun
 
 
@@ -58,7 +58,10 @@ def at_velocity(measurement: Measurement, velocity: float | None) -> bool:
     return bool(np.isclose(measurement.velocity, velocity))
 
 
-def measured(values: Float[np.ndarray, " values"]) -> tuple[float, float | None, int]:
+Mean: TypeAlias = tuple[float, float | None, int]  # of several values, with their scatter and number
+
+
+def measured(values: Float[np.ndarray, " values"]) -> Mean:
     """Mean, standard deviation and number of the values that are finite."""
     values = values[np.isfinite(values)]
     if not len(values):
@@ -134,7 +137,7 @@ class PeakForce(NamedTuple):
     scatter: float | None  # N
 
 
-def interpolated(points: Sequence[PeakForce], velocity: float) -> tuple[float, float | None, int]:
+def interpolated(points: Sequence[PeakForce], velocity: float) -> Mean:
     """Force on the straight line between the records whose peak velocities enclose a velocity; NaN beyond them."""
     points = sorted(points)
     velocities = np.array([point.velocity for point in points])
@@ -151,7 +154,7 @@ def interpolated(points: Sequence[PeakForce], velocity: float) -> tuple[float, f
     return (1 - share) * one.force + share * two.force, between if have_scatter else None, 2
 
 
-def in_window(points: Sequence[PeakForce], velocity: float, window: float) -> tuple[float, float | None, int]:
+def in_window(points: Sequence[PeakForce], velocity: float, window: float) -> Mean:
     """Mean force of the records whose peak velocity is within a share of a velocity; NaN without one.
 
     The scatter is that over the records, or over the cycles of a single one.
@@ -161,7 +164,7 @@ def in_window(points: Sequence[PeakForce], velocity: float, window: float) -> tu
     return value, inside[0].scatter if count == 1 else scatter, count
 
 
-def on_loop(cycles: FoldedCycles, sign: float, velocity: float, window: float) -> tuple[float, float | None, int]:
+def on_loop(cycles: FoldedCycles, sign: float, velocity: float, window: float) -> Mean:
     """Force at a velocity on the continuous loop, mean of its accelerating and its decelerating branch.
 
     Each branch is fitted by a straight line over the velocities within a share of the stated one. NaN where the
@@ -179,7 +182,6 @@ def on_loop(cycles: FoldedCycles, sign: float, velocity: float, window: float) -
 
 
 def _force_at(velocity: Cycle, force: Cycle, at: float, window: float) -> float:
-    """Force at a velocity on one branch."""
     near = np.abs(velocity - at) <= window * at
     if near.sum() >= 3 and velocity[near].min() < at < velocity[near].max():
         offset = velocity[near] - at
@@ -262,81 +264,71 @@ def fastest(runs: Sequence[BenchRun]) -> BenchRun:
     return max(runs, key=lambda run: run.peak_velocity)
 
 
-def forces_at(
-    velocities: Sequence[float] | None,
-    setting: str,
-    runs: Sequence[BenchRun],
-    cycles: Mapping[str, FoldedCycles],
-    of_records: Sequence[Measurement],
-    method: str,
-    window: float,
-) -> list[Measurement]:
-    """Forces and their ratio at the stated velocities; without any stated, at those that the records reach."""
-    measurements, peaks, loop = [], _peaks_of(setting, runs, of_records), cycles[fastest(runs).name]
-    for velocity in OEM_VELOCITIES if velocities is None else velocities:
-        forces = {}
-        for direction, sign in DIRECTIONS.items():
-            if method == "loop":
-                forces[direction] = on_loop(loop, sign, velocity, window)
-            elif method == "window":
-                forces[direction] = in_window(peaks[direction], velocity, window)
-            else:
-                forces[direction] = interpolated(peaks[direction], velocity)
-        values = [force[0] for force in forces.values()]
-        if velocities is None and not np.isfinite(values).any():
-            continue
-        more = {"setting": setting, "velocity": float(velocity)}
-        measurements += [Measurement(f"{name} force", "N", *force, **more) for name, force in forces.items()]
-        measurements.append(Measurement("rebound/compression ratio", "", *_ratio(*forces.values()), **more))
-    return measurements
+class Forces(NamedTuple):
+    """Records by setting, and how forces at stated velocities are found from them."""
+
+    settings: Mapping[str, Sequence[BenchRun]]
+    cycles: Mapping[str, FoldedCycles]
+    method: str
+    window: float
+
+    def at(
+        self, velocities: Sequence[float] | None, setting: str, of_records: Sequence[Measurement]
+    ) -> list[Measurement]:
+        """Forces and their ratio at the stated velocities; without any stated, at those that the records reach."""
+        measurements, peaks = [], self._peaks(setting, of_records)
+        loop = self.cycles[fastest(self.settings[setting]).name]
+        for velocity in OEM_VELOCITIES if velocities is None else velocities:
+            forces: dict[str, Mean] = {}
+            for direction, sign in DIRECTIONS.items():
+                if self.method == "loop":
+                    forces[direction] = on_loop(loop, sign, velocity, self.window)
+                elif self.method == "window":
+                    forces[direction] = in_window(peaks[direction], velocity, self.window)
+                else:
+                    forces[direction] = interpolated(peaks[direction], velocity)
+            values = [force[0] for force in forces.values()]
+            if velocities is None and not np.isfinite(values).any():
+                continue
+            more = {"setting": setting, "velocity": float(velocity)}
+            measurements += [Measurement(f"{name} force", "N", *force, **more) for name, force in forces.items()]
+            measurements.append(Measurement("rebound/compression ratio", "", *_ratio(*forces.values()), **more))
+        return measurements
+
+    def _peaks(self, setting: str, measurements: Sequence[Measurement]) -> dict[str, list[PeakForce]]:
+        """Forces at the peak velocities of each direction, one for each motion: repeated records are averaged."""
+        by = {(m.record, m.quantity): m for m in measurements if m.record and m.setting == setting}
+        groups = repeats(self.settings[setting])
+        found = {name: [_peak_force([run.name for run in group], by, name) for group in groups] for name in DIRECTIONS}
+        return {name: [peak for peak in peaks if peak is not None] for name, peaks in found.items()}
+
+    def span(self, measurements: Sequence[Measurement]) -> tuple[float, float, str]:
+        """The lowest and highest velocity at which all settings give a force, equal if at none; in words."""
+        peaks = [points for name in self.settings for points in self._peaks(name, measurements).values()]
+        spans = [[point.velocity for point in points] for points in peaks if points]
+        low, high = max(map(min, spans), default=0.0), min(map(max, spans), default=0.0)
+        loops = [self.cycles[fastest(runs).name] for runs in self.settings.values()] if self.method == "loop" else []
+        if loops and not any(speed_is_constant(loop.stroke, loop.velocity).any() for loop in loops):
+            low = 0.0  # a loop goes through all velocities
+        at = f"the records give forces at {high:.3g} m/s" if self.method == "loop" else "the records enclose none"
+        words = f"the records give forces from {low:.3g} to {high:.3g} m/s" if low < high else at
+        return low, max(low, high), words
 
 
-def _peaks_of(
-    setting: str, runs: Sequence[BenchRun], measurements: Sequence[Measurement]
-) -> dict[str, list[PeakForce]]:
-    """Forces at the peak velocities of the records of a setting, by direction."""
-    of_records = [m for m in measurements if m.record and m.setting == setting]
-    return {direction: _peak_forces(runs, of_records, direction) for direction in DIRECTIONS}
+def _peak_force(records: Sequence[str], by: Mapping[tuple[str, str], Measurement], direction: str) -> PeakForce | None:
+    """Force at the peak velocity of a direction, of records of one motion; None where it was not measured."""
+    velocity = np.array([abs(by[record, f"{direction} velocity"].value) for record in records])
+    forces = [by[record, f"{direction} force"] for record in records]
+    value, between, count = measured(np.array([m.value for m in forces]))
+    within = [m.scatter for m in forces if m.scatter is not None]
+    parts = [] if between is None else [between]
+    parts += [float(np.sqrt(np.mean(np.square(within))))] if within else []
+    if not count or not np.isfinite(velocity).all():
+        return None
+    return PeakForce(float(velocity.mean()), value, float(np.linalg.norm(parts)) if parts else None)
 
 
-def _peak_forces(runs: Sequence[BenchRun], of_records: Sequence[Measurement], direction: str) -> list[PeakForce]:
-    """Force at the peak velocity of a direction, one for each motion: repeated records are averaged."""
-    by = {(m.record, m.quantity): m for m in of_records}
-    peaks = []
-    for group in repeats(runs):
-        velocity = np.array([abs(by[run.name, f"{direction} velocity"].value) for run in group])
-        forces = [by[run.name, f"{direction} force"] for run in group]
-        value, between, count = measured(np.array([m.value for m in forces]))
-        within = [m.scatter for m in forces if m.scatter is not None]
-        parts = [] if between is None else [between]
-        parts += [float(np.sqrt(np.mean(np.square(within))))] if within else []
-        if count and np.isfinite(velocity).all():
-            scatter = float(np.linalg.norm(parts)) if parts else None
-            peaks.append(PeakForce(float(velocity.mean()), value, scatter))
-    return peaks
-
-
-def span(
-    settings: Mapping[str, Sequence[BenchRun]],
-    cycles: Mapping[str, FoldedCycles],
-    measurements: Sequence[Measurement],
-    method: str,
-) -> tuple[float, float, str]:
-    """The lowest and highest velocity at which the records of all settings give a force, equal if at none; in words."""
-    peaks = [points for name, runs in settings.items() for points in _peaks_of(name, runs, measurements).values()]
-    spans = [[point.velocity for point in points] for points in peaks if points]
-    low, high = max(map(min, spans), default=0.0), min(map(max, spans), default=0.0)
-    loops = [cycles[fastest(runs).name] for runs in settings.values()] if method == "loop" else []
-    if loops and not any(speed_is_constant(loop.stroke, loop.velocity).any() for loop in loops):
-        low = 0.0  # a loop goes through all velocities
-    at = f"the records give forces at {high:.3g} m/s" if method == "loop" else "the records enclose none"
-    words = f"the records give forces from {low:.3g} to {high:.3g} m/s" if low < high else at
-    return low, max(low, high), words
-
-
-def _ratio(
-    one: tuple[float, float | None, int], other: tuple[float, float | None, int]
-) -> tuple[float, float | None, int]:
+def _ratio(one: Mean, other: Mean) -> Mean:
     """Ratio of the magnitudes of two forces; their scatters taken as independent."""
     if not other[0]:
         return float("nan"), None, 0

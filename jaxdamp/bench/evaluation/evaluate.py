@@ -9,10 +9,10 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError
 from jaxdamp._one_thread import one_thread
-from jaxdamp.bench.analysis import FoldedCycles, as_records, fold_cycles
+from jaxdamp.bench.analysis import as_records, fold_cycles
 from jaxdamp.bench.contradictions import repeats
 from jaxdamp.bench.evaluation import curve
-from jaxdamp.bench.evaluation.curve import WINDOW, Measurement, fastest, forces_at, measured, span
+from jaxdamp.bench.evaluation.curve import WINDOW, Forces, Measurement, fastest, measured
 from jaxdamp.bench.evaluation.result import Evaluation
 from jaxdamp.bench.evaluation.separation import GasAndFriction, separate_gas_and_friction
 from jaxdamp.bench.runs import BenchRun
@@ -65,12 +65,12 @@ def evaluate(
     settings, notes = _by_settings(cyclic, by)
     notes += _notes(chosen)
     cycles = {run.name: fold_cycles(run) for run in cyclic}
-    method = _usual_method(settings) if method is None else method
+    forces = Forces(settings, cycles, method or _usual_method(settings), window)
     measurements: list[Measurement] = []
     gas: dict[str, GasAndFriction] = {}
     for name, group in settings.items():
         slowest = min(group, key=lambda run: run.peak_velocity)
-        measurements += _of_setting(name, group, cycles, velocities, method, window)
+        measurements += _of_setting(name, forces, velocities)
         try:
             gas[name] = separate_gas_and_friction(slowest)
         except ArgumentError as error:
@@ -78,10 +78,10 @@ def evaluate(
         else:
             measurements += [replace(m, setting=name) for m in gas[name].measurements if np.isfinite(m.value)]
             notes += [f"{slowest.name}: {gas[name].note}"] if gas[name].note else []
-    missed, found = _not_reached(velocities, settings, cycles, measurements, method, window)
+    missed, found = _not_reached(velocities, forces, measurements)
     measurements, notes = measurements + found, missed + notes
     stated = tuple(sorted({m.velocity for m in measurements if m.velocity is not None}))
-    return Evaluation(tuple(measurements), settings, cycles, gas, stated, method, tuple(notes), window)
+    return Evaluation(tuple(measurements), settings, cycles, gas, stated, forces.method, tuple(notes), window)
 
 
 def _check_options(velocities: Sequence[float] | None, method: str | None, window: float) -> None:
@@ -102,23 +102,16 @@ def _usual_method(settings: Mapping[str, Sequence[BenchRun]]) -> str:
     return "interpolation" if near and all(len(repeats(runs)) > 1 for runs in settings.values()) else "loop"
 
 
-def _of_setting(
-    name: str,
-    runs: Sequence[BenchRun],
-    cycles: Mapping[str, FoldedCycles],
-    velocities: Sequence[float] | None,
-    method: str,
-    window: float,
-) -> list[Measurement]:
+def _of_setting(name: str, forces: Forces, velocities: Sequence[float] | None) -> list[Measurement]:
     """The figures of the records at one setting, its forces at the stated velocities, its rates and knees."""
+    runs, cycles = forces.settings[name], forces.cycles
     of_records = [
         Measurement(quantity, unit, *measured(values), setting=name, record=run.name)
         for run in runs
         for (quantity, unit), values in curve.cycle_figures(cycles[run.name]).items()
     ]
-    at_velocities = forces_at(velocities, name, runs, cycles, of_records, method, window)
     record = fastest(runs).name
-    return [*of_records, *at_velocities, *curve.rates_and_knees(cycles[record], name, record)]
+    return [*of_records, *forces.at(velocities, name, of_records), *curve.rates_and_knees(cycles[record], name, record)]
 
 
 def _notes(runs: Sequence[BenchRun]) -> list[str]:
@@ -145,7 +138,7 @@ def _by_settings(
         if apart:
             runs, by = sorted(runs, key=lambda run: by_number(apart[run.name])), lambda run: apart[run.name]
     if by is None:
-        runs = sorted(runs, key=_command)
+        runs = sorted(runs, key=lambda run: -np.inf if run.command is None else run.command)
     settings: dict[str, tuple[BenchRun, ...]] = {}
     for run in runs:
         name = _setting(run, by)
@@ -161,33 +154,23 @@ def _setting(run: BenchRun, by: Callable[[BenchRun], object] | None) -> str:
     return "" if run.command is None else f"{run.command:g}"
 
 
-def _command(run: BenchRun) -> float:
-    """Records without a command before those with one, these in its order."""
-    return -np.inf if run.command is None else run.command
-
-
 def _not_reached(
-    velocities: Sequence[float] | None,
-    settings: Mapping[str, Sequence[BenchRun]],
-    cycles: Mapping[str, FoldedCycles],
-    measurements: Sequence[Measurement],
-    method: str,
-    window: float,
+    velocities: Sequence[float] | None, forces: Forces, measurements: Sequence[Measurement]
 ) -> tuple[list[str], list[Measurement]]:
     """Sentences on velocities at which no record gives a force; and forces at another one, where none was stated."""
     reached = {m.velocity for m in measurements if m.velocity is not None and np.isfinite(m.value)}
     missed = [v for v in velocities or () if v not in reached]
     if not missed and (velocities is not None or reached):
         return [], []
-    low, high, where = span(settings, cycles, measurements, method)
+    low, high, where = forces.span(measurements)
     if velocities is not None:
         return [f"No force at {v:.4g} m/s: {where}." for v in missed], []
     found, instead = list[Measurement](), "Add records of other velocities."
-    if low < high or method == "loop":
+    if low < high or forces.method == "loop":
         digits = 1 - int(np.floor(np.log10(high)))
         velocity = max(float(np.floor(high * 10.0**digits) / 10.0**digits), low)
         instead = f"Forces are stated at {velocity:.4g} m/s."
-        for name, runs in settings.items():
-            found += forces_at([velocity], name, runs, cycles, measurements, method, window)
+        for name in forces.settings:
+            found += forces.at([velocity], name, measurements)
     usual = f"None of the usual velocities, from {curve.OEM_VELOCITIES[0]:g} m/s on, is reached"
     return [f"{usual}: {where}. {instead}"], found

@@ -109,7 +109,6 @@ class Limit:
         return sign * value > 0.0 and all(sign * bound < 0.0 for bound in bounds)
 
     def _remedy(self) -> str:
-        """How it is written with the usual sign of its quantity."""
         unit, word = UNITS[self.quantity], "positive" if _SIGNS[self.quantity] > 0.0 else "negative"
         turned = {"minimum": self.maximum, "maximum": self.minimum}
         bounds = (f"{name} {-bound:g} {unit}" for name, bound in turned.items() if bound is not None)

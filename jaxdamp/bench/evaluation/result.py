@@ -12,7 +12,7 @@ from jaxdamp._tables import Cell, Column, Compared, Contents, Table, comparison_
 from jaxdamp._types import Figure
 from jaxdamp.bench.analysis import FoldedCycles
 from jaxdamp.bench.contradictions import repeats
-from jaxdamp.bench.evaluation.curve import WINDOW, Measurement, at_velocity, forces_at, measured, span
+from jaxdamp.bench.evaluation.curve import WINDOW, Forces, Measurement, at_velocity, measured
 from jaxdamp.bench.evaluation.limits import Limit, LimitCheck
 from jaxdamp.bench.evaluation.separation import GasAndFriction
 from jaxdamp.bench.runs import BenchRun
@@ -169,14 +169,14 @@ class Evaluation(AbstractResult):
 
         Forces are evaluated at the velocities of the limits too, as at those given to `bench.evaluate`.
         """
-        limits, found = tuple(limits), self.measurements
+        limits, found = tuple(limits), [*self.measurements]
+        forces = Forces(self.settings, self.cycles, self.method, self.window)
         wanted = dict.fromkeys(limit.velocity for limit in limits if limit.velocity is not None)
-        for name, runs in self.settings.items():
+        for name in self.settings:
             own = [m for m in self.measurements if m.setting == name]
             missing = [velocity for velocity in wanted if not any(at_velocity(m, velocity) for m in own)]
-            more = forces_at(missing, name, runs, self.cycles, self.measurements, self.method, self.window)
-            found = (*found, *more)
-        return LimitCheck.of(found, limits, span(self.settings, self.cycles, self.measurements, self.method)[2])
+            found += forces.at(missing, name, self.measurements)
+        return LimitCheck.of(found, limits, forces.span(self.measurements)[2])
 
     def content(self) -> Contents:
         """All measurements as plain data."""

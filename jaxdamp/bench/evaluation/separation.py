@@ -12,7 +12,7 @@ from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Contents, Table
 from jaxdamp.bench.analysis import FoldedCycles, fold_cycles
 from jaxdamp.bench.evaluation.curve import LOW_SPEED, LOWEST_SHARE, Measurement, measured
-from jaxdamp.bench.motion import Samples
+from jaxdamp.bench.motion import Samples, mean_curve
 from jaxdamp.bench.runs import BenchRun
 
 
@@ -143,15 +143,19 @@ def separate_gas_and_friction(run: BenchRun, *, up_to: float = LOW_SPEED) -> Gas
     cycles = fold_cycles(run)
     high = min(up_to, run.peak_velocity)
     low = LOWEST_SHARE * high
-    fits, uncertain, note = _fit(cycles, low, high, run)
+    ends = float(cycles.stroke.min()), float(cycles.stroke.max())
+    middle = 0.5 * (ends[1] + ends[0])
+    fits, uncertain, note = _fit(cycles, middle, low, high, run)
     quantities = (("gas force", "N"), ("gas rate", "N/m"), ("friction", "N"))
     quantities += (("rebound bleed rate", "N s/m"), ("compression bleed rate", "N s/m"))
     measurements = tuple(
         Measurement(name, unit, *measured(column), record=run.name, uncertainty=uncertain.get(name))
         for (name, unit), column in zip(quantities, fits.T, strict=True)
     )
-    stroke, rebound, compression = _branches(cycles)
-    middle = 0.5 * float(cycles.stroke.max() + cycles.stroke.min())
+    (stroke, rebound), (_, compression) = (
+        mean_curve(cycles.stroke[branch], cycles.force[branch], *ends, _BINS)
+        for branch in (cycles.velocity > 0, cycles.velocity < 0)
+    )
     return GasAndFriction(measurements, middle, stroke, rebound, compression, run.name, (low, high), note)
 
 
@@ -165,7 +169,7 @@ class _Fits(NamedTuple):
 
 
 def _fit(
-    cycles: FoldedCycles, low: float, high: float, run: BenchRun
+    cycles: FoldedCycles, middle: float, low: float, high: float, run: BenchRun
 ) -> tuple[Float[np.ndarray, "cycles 5"], dict[str, float], str]:
     """Gas force, gas rate, friction and both rates of each cycle, the uncertainty of gas force and friction, a note."""
     use = [(np.abs(velocity) >= low) & (np.abs(velocity) <= high) for velocity in cycles.velocity]
@@ -174,7 +178,6 @@ def _fit(
         remedy = "Take a slower record, or a larger `up_to`."
         must = "leave four samples in each direction"
         _checks.refuse("up_to", must, f"{high:.3g} m/s of record {run.name!r}", remedy)
-    middle = 0.5 * float(cycles.stroke.max() + cycles.stroke.min())
     parts = [
         (stroke[part] - middle, u, force[part])
         for stroke, force, part, u in zip(cycles.stroke, cycles.force, use, speeds, strict=True)
@@ -232,16 +235,3 @@ def _of_order(parts: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], order:
         errors.append(error[:3])
         squares, free = squares + left, free + more
     return _Fits(np.array(values), np.array(errors), squares, free)
-
-
-def _branches(cycles: FoldedCycles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Strokes, and the mean force there on the way into rebound and into compression."""
-    low, high = float(cycles.stroke.min()), float(cycles.stroke.max())
-    bins = np.minimum(((cycles.stroke - low) / (high - low) * _BINS).astype(int), _BINS - 1)
-    centres = low + (np.arange(_BINS) + 0.5) / _BINS * (high - low)
-    means = []
-    for branch in (cycles.velocity > 0, cycles.velocity < 0):
-        count = np.bincount(bins[branch], minlength=_BINS)
-        sums = np.bincount(bins[branch], cycles.force[branch], minlength=_BINS)
-        means.append(np.divide(sums, count, out=np.full(_BINS, np.nan), where=count > 0))
-    return centres, means[0], means[1]

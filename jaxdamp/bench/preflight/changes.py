@@ -1,7 +1,5 @@
 """Checks for a level, a delay or a gain of the force that changes midway in a record, and stays changed."""
 
-from typing import NamedTuple
-
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -71,30 +69,21 @@ def _late_in_few_cycles(e: Examined, cycles: FoldedCycles) -> list[Finding]:
     places = np.arange(points // 2, force.size - points // 2 + 1, max(points // _PLACES, 1))
     squares = _squares(force, places)
     left, at = float(squares.min()), int(places[squares.argmin()])
-    sides, about_mean = _sides(force, at), float(np.sum((force - force.mean(axis=0)) ** 2))
+    (full, other, there, full_first), about_mean = _sides(force, at), float(np.sum((force - force.mean(axis=0)) ** 2))
     degrees = (count - 1) * points
     above = about_mean - noise * degrees
-    inside = left - noise * (degrees - np.count_nonzero(sides.there))
+    inside = left - noise * (degrees - np.count_nonzero(there))
     if about_mean < _ABOVE * noise * degrees or inside > _REPEATS * above:
         return []
     shifts = np.arange(-(points // 4), points // 4 + 1)
-    squares = [np.sum((sides.other - np.roll(sides.full, shift))[sides.there] ** 2) for shift in shifts]
+    squares = [np.sum((other - np.roll(full, shift))[there] ** 2) for shift in shifts]
     best = int(np.argmin(squares))
-    delay = float((shifts[best] if sides.full_first else -shifts[best]) * np.mean(cycles.periods) / points)
+    delay = float((shifts[best] if full_first else -shifts[best]) * np.mean(cycles.periods) / points)
     if squares[best] > _BETTER * squares[len(shifts) // 2] or abs(delay) <= _least_delay(e):
         return []
     begin = cycles.starts[at // points] + cycles.periods[at // points] * (at % points) / points
     sample = int(np.searchsorted(e.run.time, begin))
     return _said(e, "delay changes", delay, "s", (sample, min(sample + points // _PLACES, len(e.run) - 1)))
-
-
-class _Sides(NamedTuple):
-    """The mean cycles before and behind an instant: one that is known as a whole, and the other."""
-
-    full: Samples
-    other: Samples
-    there: np.ndarray  # where the other is known
-    full_first: bool
 
 
 def _squares(force: Float[np.ndarray, "cycles points"], places: Int[np.ndarray, " places"]) -> np.ndarray:
@@ -107,12 +96,13 @@ def _squares(force: Float[np.ndarray, "cycles points"], places: Int[np.ndarray, 
     return np.sum(squares[-1] - means[0] - means[1] / np.maximum(count - before, 1), axis=1)
 
 
-def _sides(force: Float[np.ndarray, "cycles points"], at: int) -> _Sides:
+def _sides(force: Float[np.ndarray, "cycles points"], at: int) -> tuple[Samples, Samples, np.ndarray, bool]:
+    """Mean cycles before and behind an instant: the one known as a whole, the other, where that is; which is first."""
     before = (np.arange(force.size) < at).reshape(force.shape)
     counts = [part.sum(axis=0) for part in (before, ~before)]
     means = [np.sum(force * part, axis=0) / np.maximum(n, 1) for part, n in zip((before, ~before), counts, strict=True)]
     first = bool(counts[0].min() > 0)
-    return _Sides(means[1 - first], means[first], counts[first] > 0, first)
+    return means[1 - first], means[first], counts[first] > 0, first
 
 
 def _least_delay(e: Examined) -> float:

@@ -303,8 +303,7 @@ def gas_of_the_slowest(findings: Sequence[Finding], runs: Sequence[BenchRun]) ->
     names = ("gas force", "static force against gas")
     having = {finding.record for finding in findings if finding.name in names}
     slowest: dict[float | None, BenchRun] = {}
-    for run in runs:
-        other = slowest.get(run.command)
-        slowest[run.command] = run if other is None or run.peak_velocity < other.peak_velocity else other
+    for run in sorted(runs, key=lambda run: run.peak_velocity):
+        slowest.setdefault(run.command, run)
     without = {run.name for run in runs if slowest[run.command].name not in having}
     return [finding for finding in findings if finding.name not in names or finding.record not in without]

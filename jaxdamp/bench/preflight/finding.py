@@ -9,8 +9,9 @@ from jaxtyping import Int
 from jaxdamp import _checks
 from jaxdamp.bench.analysis import FoldedCycles, fold_cycles, steady_cycles
 from jaxdamp.bench.contradictions import ALIKE, SAME_SHAPE
-from jaxdamp.bench.motion import Samples, moving_span, white_noise
+from jaxdamp.bench.motion import Samples, mean_curve, moving_span, white_noise
 from jaxdamp.bench.runs import BenchRun
+from jaxdamp.bench.spectrum import MAINS
 
 
 SHARE = 0.3  # of the cycles: what is there more often is the damper's, such as friction that turns
@@ -75,7 +76,6 @@ def _resolution(values: Samples, still: int, stretches: int) -> float:
     return max(float(decimals) * largest, coarse)
 
 
-MAINS = (50.0, 60.0)  # Hz
 _HARMONICS = 5  # of the mains
 _PERIODS = 20  # of a line, at least: the noise is that of so many lines beside it, which must not be of zero frequency
 _RIPPLE = 3.0  # times the harmonics of the motion beside it
@@ -176,17 +176,12 @@ class Finding:
 
 
 class Examined:
-    """A record with what several checks need of it, computed once.
-
-    Attributes:
-        run: the record.
-        moving: the samples of the motion, without rest before and after.
-    """
+    """A record with what several checks need of it, computed once."""
 
     def __init__(self, run: BenchRun) -> None:
         self.run = run
         first, last = moving_span(run.time, run.stroke, run.frequency)
-        self.moving = slice(first, last + 1)
+        self.moving = slice(first, last + 1)  # the samples of the motion, without rest before and after
 
     @cached_property
     def cycles(self) -> FoldedCycles | None:
@@ -258,13 +253,9 @@ class Examined:
     def above_curve(self) -> Samples:
         """The force less its mean at the velocity of each sample [N], over the motion: what is not a curve of it."""
         velocity, force = self.run.velocity[self.moving], self.run.force[self.moving]
-        low, high = float(velocity.min()), float(velocity.max())
-        bins = np.minimum(((velocity - low) / (high - low) * BINS).astype(int), BINS - 1)
-        count = np.bincount(bins, minlength=BINS)
-        there = count > 0
-        means = np.bincount(bins, force, minlength=BINS)[there] / count[there]
-        centres = low + (np.flatnonzero(there) + 0.5) / BINS * (high - low)
-        return force - np.interp(velocity, centres, means)
+        centres, means = mean_curve(velocity, force, float(velocity.min()), float(velocity.max()), BINS)
+        there = np.isfinite(means)
+        return force - np.interp(velocity, centres[there], means[there])
 
     @property
     def channels(self) -> dict[str, Samples]:

@@ -3,7 +3,8 @@
 import numpy as np
 
 from jaxdamp.bench.motion import Samples
-from jaxdamp.bench.preflight.finding import MAINS, SHARE, Examined, Finding, runs_of, step
+from jaxdamp.bench.preflight.finding import SHARE, Examined, Finding, runs_of, step
+from jaxdamp.bench.spectrum import MAINS
 
 
 UNITS = {"stroke": "m", "force": "N"}
@@ -33,10 +34,8 @@ def repeated(e: Examined) -> list[Finding]:
             continue
         values = getattr(e.run, name)
         gaps = e.gaps[name]
-        for kind, part in (
-            ("dropout", gaps[values[gaps[:, 0]] == 0.0]),
-            ("held", gaps[values[gaps[:, 0]] != 0.0]),
-        ):
+        zero = values[gaps[:, 0]] == 0.0
+        for kind, part in (("dropout", gaps[zero]), ("held", gaps[~zero])):
             if len(part):
                 findings += _gap_finding(e, name, kind, part)
     return findings

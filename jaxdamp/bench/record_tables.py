@@ -1,5 +1,6 @@
-"""Channels of a record that have clocks of their own, brought onto one."""
+"""From the tables of a file to those of its records: tests set apart, channels of several clocks brought onto one."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -9,9 +10,9 @@ import numpy as np
 from jaxdamp._checks import ArgumentError
 from jaxdamp.bench.clock import FEWEST, check_numbers, check_order, gaps
 from jaxdamp.bench.columns import Choice, column_of, find_one, is_record, lacking
+from jaxdamp.bench.headers import split_header
 from jaxdamp.bench.motion import Samples
-from jaxdamp.bench.raw import RawColumn, RawTable
-from jaxdamp.bench.raw_tables import apart
+from jaxdamp.bench.raw import RawColumn, RawTable, apart, in_words
 
 
 _ONE_GROUP = "Export the channels of a record on one clock, in one group."
@@ -30,10 +31,6 @@ def one_record(parts: Sequence[RawTable], choice: Choice) -> list[RawTable]:
 
     Temperature and command of the others are brought onto its clock, and a note names what is left out. There are
     several records if several tables have stroke and force.
-
-    Raises:
-        ValueError: stroke and force have different numbers of samples, and at least one of them no time; what
-            `on_one_clock` refuses.
     """
     if len(parts) == 1:
         return [*parts]
@@ -126,9 +123,6 @@ def on_one_clock(tables: Sequence[RawTable], choice: Choice) -> list[RawTable]:
 
     The other channels are interpolated by cubics over the time that both clocks cover. Files with a table that has
     both, and tables without a time, stay as they are.
-
-    Raises:
-        ValueError: several tables could belong together, a clock has gaps, or both do not run at the same time.
     """
     motion = "velocity" if choice.stroke_from_velocity else "stroke"
     moved, loaded = ([table for table in tables if is_record(table, choice, (r,))] for r in (motion, "force"))
@@ -233,3 +227,83 @@ def _at(common: np.ndarray, clock: np.ndarray, column: RawColumn) -> RawColumn:
     holes = ~np.isfinite(np.interp(common, clock, values))
     smooth = CubicSpline(clock[good], values[good])(common)
     return RawColumn(column.name, np.where(holes, np.nan, smooth), column.unit)
+
+
+_TEST_NAMES = {
+    "test",
+    "test no",
+    "test number",
+    "run",
+    "run no",
+    "run number",
+    "cycle set",
+    "versuch",
+    "messung",
+    "record",
+}
+_NEAR_START = 0.05  # of the time of a test, from its start, within which the next one starts
+_MOST_TESTS = 500  # tests in a file
+
+
+def tests_apart(table: RawTable, choice: Choice) -> list[RawTable]:
+    """The tests of a table, each a table of its own; the table itself where it holds one.
+
+    A test ends where the time falls back to where it started and, if there is a column of tests, where its number
+    changes. Tests by such a column that are too short for a record are left out, and the notes of the others say so.
+    """
+    numbered = _column_of_tests(table)
+    ends = _changes(np.asarray(table.columns[numbered].values)) if numbered is not None else _restarts(table, choice)
+    bounds = [0, *ends, len(table)]
+    sizes = np.diff(bounds)
+    if not ends or len(bounds) > _MOST_TESTS or (min if numbered is None else max)(sizes) < FEWEST:
+        return [table]
+    why = "the time starts again" if numbered is None else f"column {table.names[numbered]!r} changes"
+    parts, short = [], []
+    for number, (start, stop) in enumerate(itertools.pairwise(bounds), 1):
+        name = f"test {number}" if numbered is None else f"test {in_words(table.columns[numbered].values[start])}"
+        if stop - start < FEWEST:
+            short.append(f"{name} of the file left out: {stop - start} rows, and a record needs {FEWEST}")
+            continue
+        part = _part(table, slice(start, stop), numbered)
+        note = f"{name} of {len(bounds) - 1} in the file, where {why}"
+        parts.append(replace(part, record=f"{table.record} {name}".strip(), notes=(*table.notes, note)))
+    names = [part.record for part in parts]
+    again = [f"{name} ({number})" if names.count(name) > 1 else name for number, name in enumerate(names, 1)]
+    return [replace(p, record=name, notes=(*p.notes, *short)) for p, name in zip(parts, again, strict=True)]
+
+
+def _column_of_tests(table: RawTable) -> int | None:
+    """The column that numbers or names the tests, if each has many rows."""
+    for index, column in enumerate(table.columns):
+        name = " ".join(split_header(column.name)[0].lower().replace("_", " ").replace(".", "").split())
+        if (
+            name in _TEST_NAMES
+            and not column.faults
+            and 0 < len(_changes(np.asarray(column.values))) < len(table) / FEWEST
+        ):
+            return index
+    return None
+
+
+def _changes(values: np.ndarray) -> list[int]:
+    return (np.flatnonzero(values[1:] != values[:-1]) + 1).tolist()
+
+
+def _restarts(table: RawTable, choice: Choice) -> list[int]:
+    """Where the time falls back to nearly where it started."""
+    index = _one(table, "time", choice)
+    if index is None or table.columns[index].is_text or table.columns[index].faults:
+        return []
+    time = np.asarray(table.columns[index].values)
+    back = np.flatnonzero(np.diff(time) < 0.0) + 1
+    starts = [0, *back.tolist()]
+    for start, following in zip(starts[:-1], back.tolist(), strict=True):
+        if abs(time[following] - time[start]) > _NEAR_START * (time[following - 1] - time[start]):
+            return []
+    return back.tolist()
+
+
+def _part(table: RawTable, rows: slice, numbered: int | None) -> RawTable:
+    """Some rows of a table, without the column that numbers the tests."""
+    columns = (column._rows(rows) for index, column in enumerate(table.columns) if index != numbered)
+    return replace(table, columns=tuple(columns), lines=table.lines[rows])
