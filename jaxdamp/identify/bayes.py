@@ -176,8 +176,7 @@ def _potential(evidence: Evidence) -> tuple[Callable[[Array], Array], Callable[[
 
     def potential(z: Array) -> Array:
         values, stretch = physical(z), jax.jacfwd(physical)(z)
-        model = problem.free.build(values)
-        residual = weight * (jnp.concatenate([part(model) for part in problem.residuals]) + shift)
+        residual = weight * (problem.residual(values) + shift)
         rise = jnp.sum(residual**2) - least
         student = power * jnp.log1p(jnp.maximum(rise, -0.5 * noise.dof) / noise.dof)
         energy = (student if np.isfinite(noise.dof) else 0.5 * rise) - jnp.linalg.slogdet(stretch)[1]

@@ -12,7 +12,7 @@ from jaxdamp._progress import Progress
 from jaxdamp._results import plotted
 from jaxdamp._second_process import anywhere, elsewhere
 from jaxdamp._settings import part, with_defaults
-from jaxdamp._tables import Contents, Table, with_unit
+from jaxdamp._tables import Column
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Figure
 from jaxdamp.bench import BenchRun, RideRecord, as_runs, usable
@@ -24,10 +24,10 @@ from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import OFFSET, Machine, absent_paths, started_machine
 from jaxdamp.identify.model import Model, on_rig, rig_of
 from jaxdamp.identify.reducing import reduced
-from jaxdamp.identify.rungs import Failure, Rung, ladder_table, verdict
+from jaxdamp.identify.rungs import Failure, Rung, verdict
 from jaxdamp.identify.scheduling import fit_scheduled, settings_stated
 from jaxdamp.identify.settings import COMPARISON, FIT, ComparisonSettings
-from jaxdamp.identify.starting import AbstractTrainedStart, Start, check_starts, frozen_by, started
+from jaxdamp.identify.starting import LearntStart, Start, check_starts, frozen_by, started
 from jaxdamp.identify.stated import start_paths
 from jaxdamp.identify.vehicle_comparing import VehicleComparison, compare_vehicles
 from jaxdamp.parameters import matching, name_patterns, parameters
@@ -44,6 +44,8 @@ class Comparison(AbstractComparison[Rung, BenchRun]):
     """Laws fitted to the same records, in the order given."""
 
     kind: ClassVar[str] = "law"
+    _title: ClassVar[str] = "Laws (shape, hysteresis and rest are shares of the squared error)"
+    _error: ClassVar[Column] = Column("RMSE", "N", ".1f")
 
     def __getitem__(self, name: str) -> FitResult:
         """The fit of the law of that name."""
@@ -58,14 +60,8 @@ class Comparison(AbstractComparison[Rung, BenchRun]):
             *(left.sentence(self.best.name) for left in between),
         )
 
-    def table(self) -> Table:
-        """Each law with its number of free parameters, its errors, their shares, and remarks."""
-        return ladder_table(self.rungs, self.failed, self.best.name)
-
-    def held_out_errors(self, rung: Rung) -> Contents:
-        """The errors of a law on motion held out, as plain data."""
-        errors = {"held_out_fit": (rung.held_out_fit_percent, "%"), "held_out_rmse": (rung.held_out_rmse, "N")}
-        return {name: with_unit(*error) for name, error in errors.items()}
+    def _shares(self, rung: Rung) -> dict[str, float]:
+        return {name: 100 * share for name, share in rung.result.error_shares._asdict().items()}
 
     def plot(self, kind: str = "ladder", **options: Any) -> Figure:
         """The errors of the laws side by side (`plots.ladder`), their loops, or the sheet of the recommended law.
@@ -238,7 +234,7 @@ def fit_each(
 
     def given(name: str, start: Start, held: tuple[str, ...] = ()) -> tuple[object, ...]:
         own = naming_only(named, _paths(_begun(start, runs, rig)), known) if known else named
-        own = {**own, "rig": rig, "freeze": (*own["freeze"], *held)}
+        own = {**own, "rig": rig, "freeze": (*own["freeze"], *frozen_by(laws[name]), *held)}
         return name, start, tuple(runs), tuple(held_out), scheduled, in_time, len(laws) > 1, own
 
     def kept(inputs: tuple[object, ...], compute: Callable[[], Computed]) -> Rung | Failure:
@@ -253,14 +249,8 @@ def fit_each(
         inputs = given(name, start, held)
         return kept(inputs, lambda: anywhere(WithPrinted(_outcome), *inputs, shared=sent))
 
-    def held_with(source: Rung, held: tuple[str, ...]) -> tuple[str, ...]:
-        return *frozen_by(laws[source.name]), *held
-
-    def simpler(source: Rung, law: AbstractDamper, held: tuple[str, ...]) -> Rung | Failure:
-        return fitted(source.name, law, held_with(source, held))
-
     def ahead(source: Rung, law: AbstractDamper, held: tuple[str, ...]) -> Callable[[], Rung | Failure] | None:
-        inputs = given(source.name, law, held_with(source, held))
+        inputs = given(source.name, law, held)
         waiting = elsewhere(WithPrinted(_outcome), *inputs, shared=sent)
         return None if waiting is None else lambda: kept(inputs, waiting)
 
@@ -269,7 +259,7 @@ def fit_each(
         rungs += [one] if isinstance(one, Rung) else []
         yield one
     if rungs and not scheduled:
-        yield from reduced(rungs, simpler, progress, ahead)
+        yield from reduced(rungs, lambda source, law, held: fitted(source.name, law, held), progress, ahead)
 
 
 def _outcome(
@@ -289,7 +279,7 @@ def _outcome(
         if held_out:
             judged = on_records(result, held_out)
         else:
-            judged = None if isinstance(start, AbstractTrainedStart) else without_parts(result, in_time=in_time)
+            judged = None if isinstance(start, LearntStart) else without_parts(result, in_time=in_time)
         if judged is None and several and all(run.of_points for run in runs):
             numbers, points = len(result.parameters), sum(map(len, runs))
             return Failure(name, f"It has {numbers} numbers for {points} points, which cannot be judged beside others.")
@@ -305,7 +295,7 @@ def _outcome(
 def _begun(law: Start, runs: Sequence[BenchRun], rig: Machine) -> Model | None:
     """A law on its machine; None where it cannot be started, which its fit then says."""
     try:
-        begin = law.untrained(runs) if isinstance(law, AbstractTrainedStart) else started(law, runs)
+        begin = law.untrained(runs) if isinstance(law, LearntStart) else started(law, runs)
         return on_rig(begin, started_machine(rig, runs))
     except NUMERICAL:
         return None

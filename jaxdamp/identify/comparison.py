@@ -15,17 +15,15 @@ from jaxdamp import _second_process
 from jaxdamp._one_thread import usable_cores
 from jaxdamp._results import AbstractResult
 from jaxdamp._status import Status
-from jaxdamp._tables import Contents
+from jaxdamp._tables import Cell, Column, Contents, Table, with_unit
 from jaxdamp.bench import BenchRun, RideRecord
-from jaxdamp.identify.recommending import Candidate, Recommendation, recommendation
-from jaxdamp.identify.rungs import Failure
+from jaxdamp.identify.rungs import Failure, R, Recommendation, recommendation
 from jaxdamp.parameters import matching
 
 
 NAMED = ("over", "freeze", "per_record", "bounds", "priors", "tie")  # options that name parameters
 MOST_THREADS = 4  # fits side by side: more of them wait for Python's lock
 
-R = TypeVar("R", bound=Candidate)
 D = TypeVar("D", BenchRun, RideRecord)
 C = TypeVar("C", bound="AbstractComparison")  # not `Self`, which run-time type checks refuse
 Names = str | Sequence[str] | Mapping[str, object] | None
@@ -49,6 +47,8 @@ class AbstractComparison(AbstractResult, Generic[R, D]):
     held_out: tuple[D, ...] = ()
     failed: tuple[Failure, ...] = ()
     kind: ClassVar[str]
+    _title: ClassVar[str]  # of the table
+    _error: ClassVar[Column]  # by which they are ranked
 
     @classmethod
     def of(cls: type[C], outcomes: Iterable[R | Failure], held_out: Iterable[D] = ()) -> C:
@@ -72,9 +72,29 @@ class AbstractComparison(AbstractResult, Generic[R, D]):
     def verdict(self) -> tuple[str, ...]:
         """Sentences on the recommended one and why it is this one."""
 
-    @abstractmethod
+    def _shares(self, rung: R) -> dict[str, float]:
+        """Shares of its squared error [%], by name."""
+        return {}
+
+    def table(self) -> Table:
+        """Each with its number of free parameters, its errors, their shares if there are any, and remarks."""
+        held, (error, unit, spec) = any(rung.held_out_rmse is not None for rung in self.rungs), self._error
+        columns = [Column(self.kind), Column("free", spec="d"), Column("fit", "%", ".1f"), self._error]
+        columns += [Column("held-out fit", "%", ".1f"), Column(f"held-out {error}", unit, spec)] * held
+        columns += [*(Column(share, "%", ".0f") for share in self._shares(self.rungs[0])), Column("note")]
+        rows: list[tuple[Cell, ...]] = []
+        for rung in self.rungs:
+            errors = (rung.fit_percent, rung.rmse, *(rung.held_out_fit_percent, rung.held_out_rmse) * held)
+            note = ", ".join(filter(None, ["recommended" * (rung is self.best), rung.doubt]))
+            rows.append((rung.name, rung.parameters, *errors, *self._shares(rung).values(), note))
+        rows += [(failure.name, *[None] * (len(columns) - 2), "failed") for failure in self.failed]
+        return Table(self._title, tuple(columns), tuple(rows))
+
     def held_out_errors(self, rung: R) -> Contents:
         """The errors of one on motion held out, as plain data."""
+        error, unit, _ = self._error
+        fit = with_unit(rung.held_out_fit_percent, "%")
+        return {"held_out_fit": fit, f"held_out_{error.lower()}": with_unit(rung.held_out_rmse, unit)}
 
     @property
     def summary(self) -> str:
@@ -144,11 +164,6 @@ def side_by_side(
     """The outcome of each start in their order, as soon as it is available, several in threads at the same time."""
     # A thread begins with the precision of the process, not with that of its caller.
     double = jnp.result_type(float) == jnp.float64
-
-    def in_precision(name: str, start: Start) -> Outcome:
-        with jax.enable_x64(double):
-            return fitted(name, start)
-
     beside = _second_process.count()
     count = 1 + beside if beside else min(usable_cores(), MOST_THREADS)
     outcomes = {name: Future[Outcome]() for name in starts}
@@ -162,7 +177,8 @@ def side_by_side(
             except IndexError:
                 return
             try:
-                outcomes[name].set_result(in_precision(name, starts[name]))
+                with jax.enable_x64(double):
+                    outcomes[name].set_result(fitted(name, starts[name]))
             except BaseException as error:
                 outcomes[name].set_exception(error)
 

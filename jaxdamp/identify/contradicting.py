@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun, Contradiction, contradictions, initial_temperature, pairs_in_words
 from jaxdamp.dampers import takes_command
-from jaxdamp.identify.model import Model, law_of, rig_of
+from jaxdamp.identify.model import Model, effects_of, law_of
 from jaxdamp.identify.settings import FitSettings
 from jaxdamp.identify.stated import stated_parameters
 
@@ -16,8 +16,8 @@ def contradicting(model: Model, runs: Sequence[BenchRun]) -> list[Contradiction]
     A law may take a command; a law or a machine may depend on the temperature; records may state a parameter of the
     law, such as a gas pressure. All count if all records state them.
     """
-    law, rig = law_of(model), rig_of(model)
-    warms = law.traits().temperature_dependent or (rig is not None and "heat" in rig.effects())
+    law = law_of(model)
+    warms = law.traits().temperature_dependent or "heat" in effects_of(model)
     if warms and all(initial_temperature(run) is not None for run in runs):
         return []
     same_command = takes_command(law) and all(run.commands is not None for run in runs)

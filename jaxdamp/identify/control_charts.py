@@ -4,7 +4,7 @@ import dataclasses
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import final
+from typing import ClassVar, final
 
 import numpy as np
 from jaxtyping import Float
@@ -19,10 +19,7 @@ Values = Float[np.ndarray, " dampers"]
 class AbstractChart(ABC):
     """A chart of numbers with the mean 0 and the standard deviation 1 while the process is in control."""
 
-    @property
-    @abstractmethod
-    def name(self) -> str:
-        """As it is called."""
+    name: ClassVar[str]  # as it is called
 
     @abstractmethod
     def statistics(self, scores: Values) -> tuple[Values, Values]:
@@ -60,15 +57,11 @@ class Shewhart(AbstractChart):
     (370.4, 43.9)
     """
 
+    name: ClassVar[str] = "individuals"
     width: float = 3.0
 
     def __post_init__(self) -> None:
         _checks.positive("width", self.width)
-
-    @property
-    def name(self) -> str:
-        """As it is called."""
-        return "individuals"
 
     def statistics(self, scores: Values) -> tuple[Values, Values]:
         """The numbers themselves."""
@@ -100,6 +93,7 @@ class Ewma(AbstractChart):
     (500, 10.5)
     """
 
+    name: ClassVar[str] = "EWMA"
     weight: float = 0.2
     width: float = 3.0
 
@@ -107,11 +101,6 @@ class Ewma(AbstractChart):
         _checks.positive("width", self.width)
         if not 0.0 < self.weight <= 1.0:
             _checks.refuse("weight", "be above 0 and at most 1", self.weight, "0.05 to 0.3 are usual.")
-
-    @property
-    def name(self) -> str:
-        """As it is called."""
-        return "EWMA"
 
     def statistics(self, scores: Values) -> tuple[Values, Values]:
         """The average after each number."""
@@ -152,17 +141,13 @@ class Cusum(AbstractChart):
     (465, 10.4)
     """
 
+    name: ClassVar[str] = "CUSUM"
     reference: float = 0.5
     decision: float = 5.0
 
     def __post_init__(self) -> None:
         _checks.positive("decision", self.decision)
         _checks.nonnegative("reference", self.reference)
-
-    @property
-    def name(self) -> str:
-        """As it is called."""
-        return "CUSUM"
 
     def statistics(self, scores: Values) -> tuple[Values, Values]:
         """C⁺ and −C⁻ after each number."""

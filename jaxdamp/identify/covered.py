@@ -7,7 +7,7 @@ import numpy as np
 
 from jaxdamp.bench import BenchRun, initial_temperature
 from jaxdamp.dampers import FittedRange
-from jaxdamp.identify.model import Model, rig_of
+from jaxdamp.identify.model import Model, law_of, rig_of
 from jaxdamp.rig import gas_and_friction
 
 
@@ -20,18 +20,15 @@ def joined_range(ranges: Sequence[FittedRange]) -> FittedRange:
     )
 
 
-def covered_range(
-    runs: Sequence[BenchRun], models: Model | Sequence[Model] | None = None, *, warms: bool = False
-) -> FittedRange:
+def covered_range(runs: Sequence[BenchRun], models: Model | Sequence[Model] | None = None) -> FittedRange:
     """Lowest and highest value of each channel over all records, and of temperature and command if stated.
 
     Stroke and force are those of the law, without what the fitted machine adds: offsets, gas, friction, inertia. If the
-    law depends on the temperature (`warms`), the one at the start of the records counts too.
+    law depends on the temperature, the one at the start of the records counts too.
 
     Arguments:
         runs: the records.
         models: the fitted law on its machine, of all or of each record.
-        warms: whether the law depends on the temperature.
 
     >>> from jaxdamp import bench, dampers
     >>> runs = bench.VirtualDyno(dampers.Linear(1500.0)).run([bench.SineTest(0.01, f) for f in (1.0, 3.0)])
@@ -43,15 +40,16 @@ def covered_range(
     channels = {"velocity": [run.velocity for run in runs]}
     channels["stroke"], channels["force"] = ([*values] for values in zip(*inside, strict=True))
     channels["frequency"] = [np.array([run.frequency]) for run in runs]
-    channels["temperature"] = _temperatures(runs, warms=warms)
+    channels["temperature"] = _temperatures(runs, each[0])
     channels["command"] = [run.commands for run in runs if run.commands is not None]
     joined = {name: np.concatenate(values) for name, values in channels.items() if values}
     limits = {name: (float(values.min()), float(values.max())) for name, values in joined.items()}
     return FittedRange(**limits)
 
 
-def _temperatures(runs: Sequence[BenchRun], *, warms: bool) -> list[np.ndarray]:
+def _temperatures(runs: Sequence[BenchRun], model: Model | None) -> list[np.ndarray]:
     """The measured temperatures [K]; if there are none and the law depends on them, those at the start."""
+    warms = model is not None and law_of(model).traits().temperature_dependent
     measured = [run.temperature for run in runs if run.temperature is not None]
     if measured or not warms:
         return measured

@@ -78,7 +78,8 @@ def parameter_table(title: str, estimates: Sequence[Estimate], truth: Module | N
     columns += [Column("with what the law misses", spec=".2g")] * spread
     columns += [Column("true", spec=".5g"), Column("(value − true)/se", spec="+.1f")] * (truth is not None)
     columns += [Column("95 % from", spec=".5g"), Column("to", spec=".5g"), Column("note"), Column("meaning")]
-    true_values = {} if truth is None else _numbers(truth)
+    known = None if truth is None else free_parameters(truth)
+    true_values = dict(zip(known.names, np.asarray(known.values).tolist(), strict=True)) if known else {}
     rows: list[tuple[Cell, ...]] = []
     for e in estimates:
         value, error = rounded(e.value, e.standard_error)
@@ -90,9 +91,3 @@ def parameter_table(title: str, estimates: Sequence[Estimate], truth: Module | N
         low, high = (Shown(end, rounded(end, e.standard_error)[0]) for end in e.interval)
         rows.append((*row, low, high, e.remark, e.meaning))
     return Table(title, tuple(columns), tuple(rows))
-
-
-def _numbers(model: Module) -> dict[str, float]:
-    """Every number of a model by name."""
-    free = free_parameters(model)
-    return {name: float(value) for name, value in zip(free.names, np.asarray(free.values), strict=True)}

@@ -24,7 +24,7 @@ from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import Machine, holds_static_force, static_force_in_words, with_static_force_on_machine
 from jaxdamp.identify.many import fit_many
 from jaxdamp.identify.many_result import ManyFits
-from jaxdamp.identify.model import rig_of
+from jaxdamp.identify.model import effects_of
 from jaxdamp.identify.noise import noise_of
 from jaxdamp.identify.preparing import prepare, records_in_words, weighting_of
 from jaxdamp.identify.printed import evaluator
@@ -179,10 +179,7 @@ def fit(
     settings = {**settings, "weighting": weighting_of(runs, records, settings["weighting"])}
     problem = prepare(law, runs, rig=rig, **part(settings, PROBLEM))
     refuse_several_laws(problem.free.tree, problem.fitted_to, settings)
-
-    def by_squares(problem: Problem, starts: int | None) -> Solution:
-        return _least_squares(problem, starts, settings["max_steps"], settings["solver"])
-
+    by_squares = functools.partial(_least_squares, max_steps=settings["max_steps"], solver=settings["solver"])
     noise = functools.partial(noise_of, force_noise=force_noise)
     problem, solution = solve_by(problem, by_squares, loss=loss, noise=noise, starts=starts)
     on_machine = holds_static_force(rig)
@@ -192,22 +189,19 @@ def fit(
         [p.path for p in parameters(problem.free.tree)],
         **{name: settings[name] for name in ("over", "freeze", "bounds", "per_record")},
     )
-    result = dataclasses.replace(judge(problem, solution, force_noise=force_noise), patterns=named)
-    if on_machine:
-        said = static_force_in_words(result, problem.runs)
-        result = dataclasses.replace(result, warnings=(*result.warnings, *said))
+    result = judge(problem, solution, force_noise=force_noise)
     words = (criterion_in_words(problem, loss, settings["priors"] or {}), records_in_words(problem))
-    criterion = "; ".join(filter(None, words))
-    if settings["input_noise"] is None:
-        return dataclasses.replace(result, criterion=criterion)
-    biases = map(float, input_noise_bias(problem, solution.best, settings["input_noise"]))
-    estimates = tuple(e._replace(bias=bias) for e, bias in zip(result.parameters, biases, strict=True))
+    said, estimates = static_force_in_words(result, problem.runs) if on_machine else [], result.parameters
+    if settings["input_noise"] is not None:
+        biases = map(float, input_noise_bias(problem, solution.best, settings["input_noise"]))
+        estimates = tuple(e._replace(bias=bias) for e, bias in zip(estimates, biases, strict=True))
     biased = on_bias(estimates)
     return dataclasses.replace(
         result,
-        criterion=criterion,
+        criterion="; ".join(filter(None, words)),
+        patterns=named,
         parameters=estimates,
-        warnings=(*result.warnings, *biased),
+        warnings=(*result.warnings, *said, *biased),
         main_warnings=(*result.main_warnings, *biased)[:MOST_WARNINGS],
     )
 
@@ -228,10 +222,7 @@ def solve(
     Raises:
         ValueError: counts below one; a solver of another kind.
     """
-
-    def by_squares(problem: Problem, starts: int | None) -> Solution:
-        return _least_squares(problem, starts, max_steps, solver)
-
+    by_squares = functools.partial(_least_squares, max_steps=max_steps, solver=solver)
     if problem.noise_known:
         return by_squares(problem, starts)
     noise = functools.partial(noise_of, force_noise=None)
@@ -245,9 +236,9 @@ def _least_squares(problem: Problem, starts: int | None, max_steps: int, solver:
     if solver is not None and not isinstance(solver, Solver):
         remedy = "For example `optimistix.Dogleg(rtol=1e-8, atol=1e-8)`."
         _checks.refuse("solver", "be a least-squares solver or minimiser of optimistix", solver, remedy)
-    rig, free = rig_of(problem.free.tree), problem.free
+    free = problem.free
     linear = problem.law.traits().linear_in_parameters and all(p.linear and not p.domain.ordered for p in free.chosen)
-    if solver is None and linear and not (rig and "heat" in rig.effects()):  # which has a closed form
+    if solver is None and linear and "heat" not in effects_of(free.tree):  # which has a closed form
         return _solve_linear(problem)
     return search_from(problem, starts=starts, max_steps=max_steps, solver=solver)
 

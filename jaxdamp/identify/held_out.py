@@ -20,7 +20,7 @@ from jaxdamp.identify.model import Model
 from jaxdamp.identify.predicting import Compared, Score, compared, errors
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.propagation import Evidence
-from jaxdamp.identify.start_temperatures import warmed
+from jaxdamp.identify.record_starts import warmed
 from jaxdamp.parameters import get, with_values
 
 
@@ -81,10 +81,12 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
         parts = zip(map(int, fitted), names, near, strict=True)
         models, told = _predicting(_refitted(start, factor), fitted, part, result)
         samples += compared(models, problem.runs, problem.initial_state, parts, told)
-    beyond = _beyond(result, fitted, unreached) if samples else []
+    if not samples:
+        return None
+    beyond = _beyond(result, fitted, unreached)
     words = _quarters(runs, alike=len(groups) == 1) if not whole else f"each of {len(runs)} records{_WITHOUT}"
     words += ", velocities that no other reaches by the fit of all" * bool(beyond)
-    return _together([*samples, *beyond], words)
+    return HeldOut(*errors([*samples, *beyond]), words)
 
 
 def _are_too_few(runs: Sequence[BenchRun], numbers: int) -> bool:
@@ -124,12 +126,7 @@ def on_records(result: FitResult, runs: Sequence[BenchRun]) -> HeldOut | None:
             parts.append((i, run.name, np.ones(len(run), bool)))
     models, told = result.models_of(runs)
     samples = compared(models, runs, result.initial_state, parts, told)
-    return _together(samples, f"{len(runs)} record{'s' * (len(runs) > 1)} held out")
-
-
-def _together(samples: Sequence[Compared], words: str) -> HeldOut | None:
-    """The errors over all parts; None if nothing was compared."""
-    return HeldOut(*errors(samples), words) if samples else None
+    return HeldOut(*errors(samples), f"{len(runs)} record{'s' * (len(runs) > 1)} held out") if samples else None
 
 
 def motions(runs: Sequence[BenchRun]) -> list[list[int]]:

@@ -12,6 +12,7 @@ from jaxtyping import Float
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
 from jaxdamp._status import Status
+from jaxdamp._triangles import unit_columns
 from jaxdamp.bench import BenchRun, contradictions_in_words
 from jaxdamp.dampers import (
     AbstractDamper,
@@ -176,8 +177,7 @@ def fitted_models(problem: Problem, values: np.ndarray) -> tuple[list[Model], Mo
         for i in range(len(problem.runs) if own else 0)
     ]
     fitted = [model for model, sigma in zip(models, problem.sigma, strict=False) if np.isfinite(sigma)]
-    warms = problem.law.traits().temperature_dependent
-    covered = covered_range(problem.fitted_to, fitted or built, warms=warms)
+    covered = covered_range(problem.fitted_to, fitted or built)
     joint = with_means(built, problem.per_record) if own else built
     return [with_range(model, covered) for model in models], with_range(joint, covered)
 
@@ -295,9 +295,7 @@ def input_noise_bias(problem: Problem, best: SearchEnd, input_noise: tuple[float
             residual, jacobian = linearised(problem.free, values, residuals)
             slope += np.asarray(jacobian).T @ np.asarray(residual)
     slope = slope / (2 * DRAWS) - best.jacobian.T @ best.residual
-    norms = np.linalg.norm(best.jacobian, axis=0)
-    scale = np.where(norms > 0, norms, 1.0)
-    scaled = best.jacobian / scale
+    scaled, scale = unit_columns(best.jacobian)
     return -np.linalg.lstsq(scaled.T @ scaled, slope / scale, rcond=1e-12)[0] / scale
 
 

@@ -1,11 +1,9 @@
 """The ladder of laws: their names, their starts, and starts that are learnt from the records."""
 
-import dataclasses
 import functools
 from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple, final
+from typing import NamedTuple
 
-import jax
 import numpy as np
 
 from jaxdamp import _checks, dampers
@@ -22,7 +20,6 @@ from jaxdamp.dampers import (
     Lag,
     Linear,
     LuGre,
-    NeuralHysteresis,
     PiecewiseLinear,
     Play,
     Polynomial,
@@ -36,27 +33,13 @@ from jaxdamp.dampers import (
 )
 from jaxdamp.identify.fitting import NUMERICAL
 from jaxdamp.identify.machine import OFFSET, Machine, force_at, lag_time, started_on
-from jaxdamp.identify.starting import AbstractTrainedStart, Start
-from jaxdamp.identify.training import Training, train
-
-
-WEIGHTS = ("hidden_weights", "hidden_biases", "output_weights", "output_biases")
-KEYS = 3
-STEPS, PATIENCE, LEARNING_RATE = 300, 100, 0.05  # of the training
-SAMPLES_PER_CYCLE = 100
-TRAINED_ON = 0.7  # of a single record, whose rest decides when the training stops
+from jaxdamp.identify.starting import LearntStart, Start
 
 
 def _friction(velocity: np.ndarray, force: np.ndarray) -> AbstractDamper:
     friction = CoulombFriction.guess(velocity, force)
     rest = force - float(friction.friction_force) * np.tanh(velocity / float(friction.friction_velocity))
     return Linear.guess(velocity, rest) + friction
-
-
-def _rate(law: AbstractMemoryless, velocity: np.ndarray) -> float:
-    """Secant slope [N s/m] at the RMS velocity."""
-    v = float(np.sqrt(np.mean(velocity**2)))
-    return (force_at(law, v) - force_at(law, -v)) / (2 * v)
 
 
 _MEMORYLESS = {
@@ -262,8 +245,9 @@ def _start(name: str, runs: Sequence[BenchRun]) -> AbstractDamper:
 
 
 def _stiffness(law: AbstractMemoryless, lag: float, velocity: np.ndarray) -> float:
-    """Stiffness [N/m] in series with which a law has this lag [s]."""
-    return max(_rate(law, velocity), 1.0) / lag
+    """Stiffness [N/m] in series with which a law, by its secant slope at the RMS velocity, has this lag [s]."""
+    v = float(np.sqrt(np.mean(velocity**2)))
+    return max((force_at(law, v) - force_at(law, -v)) / (2 * v), 1.0) / lag
 
 
 def laws_table() -> Table:
@@ -271,60 +255,3 @@ def laws_table() -> Table:
     columns = (Column("law"), Column("hysteresis"), Column("what it is"))
     rows = ((name, "yes" if law.hysteresis else "no", law.meaning) for name, law in NAMED_LAWS.items())
     return Table("Laws", columns, tuple(rows))
-
-
-@final
-@dataclasses.dataclass(frozen=True)
-class LearntStart(AbstractTrainedStart):
-    """`Linear + NeuralHysteresis + Spring`, trained on the records that a fit gives it, as a start for this fit.
-
-    The record of middle peak velocity decides, as a whole, when to stop the training and which key of the random
-    weights is best; the law is trained on all others. Of a single record the last 30 % of its time decide. A fit that
-    starts from here changes only the coefficient, the stiffnesses and the spring; the weights stay, since a fit to all
-    records would undo the early stopping. The same records and keys give the same law. `cross_validate` trains without
-    the record that it holds out.
-
-    Arguments:
-        keys: number of random starts, keys 0, 1, ....
-        options: passed on to `train`.
-
-    >>> LearntStart(keys=2).freeze[0]
-    'hidden_weights'
-    """
-
-    keys: int = KEYS
-    options: dict[str, Any] = dataclasses.field(default_factory=dict)
-
-    @property
-    def freeze(self) -> tuple[str, ...]:
-        """The parameters that a fit holds at the values of the training."""
-        return WEIGHTS
-
-    def __call__(self, runs: Sequence[BenchRun]) -> AbstractDamper:
-        """The law of the key with the smallest error on the record to stop by."""
-        return min(self.trainings(runs), key=lambda training: training.held_out_rmse).law
-
-    def trainings(self, runs: Sequence[BenchRun]) -> list[Training]:
-        """The training from each key."""
-        runs = list({run.fingerprint: run for run in runs}.values())  # a copy would be no record to stop by
-        if len(runs) == 1:
-            time = runs[0].time
-            middle = float(time[round(TRAINED_ON * len(time))])
-            runs = [runs[0].between(float(time[0]), middle), runs[0].between(middle, np.inf)]
-            stop = 1
-        else:
-            stop = sorted(range(len(runs)), key=lambda i: runs[i].peak_velocity)[len(runs) // 2]
-        rest = [run for i, run in enumerate(runs) if i != stop]
-        how: dict[str, Any] = {"steps": STEPS, "patience": PATIENCE, "learning_rate": LEARNING_RATE}
-        how |= {"weighting": "runs", "samples_per_cycle": SAMPLES_PER_CYCLE, "bad_records": "keep"} | self.options
-        return [train(self.untrained(rest, key), rest, held_out=runs[stop], **how) for key in range(self.keys)]
-
-    def untrained(self, runs: Sequence[BenchRun], key: int = 0) -> AbstractDamper:
-        """A third of the damping in one coefficient, random weights, and the spring of the records."""
-        velocity, force, stroke = (
-            np.concatenate([getattr(run, channel) for run in runs]) for channel in ("velocity", "force", "stroke")
-        )
-        speed, level = (float(np.sqrt(np.mean(values**2))) for values in (velocity, force))
-        network = NeuralHysteresis.random(jax.random.key(key), velocity_scale=speed, force_scale=level)
-        rate = float(np.asarray(Linear.guess(velocity, force).rate)) / 3.0
-        return Linear(rate) + network + Spring.guess(velocity, force, stroke)

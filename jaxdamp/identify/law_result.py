@@ -20,8 +20,8 @@ from jaxdamp.identify.model import Model, RecordStart, of_record, on_rig
 from jaxdamp.identify.predicting import ErrorShares, Score, error_shares, predict_by_record, score
 from jaxdamp.identify.propagation import Band, band
 from jaxdamp.identify.record_sensitivity import RecordSensitivity, sensitivity_to_records
+from jaxdamp.identify.record_starts import unknown_starts, warmed
 from jaxdamp.identify.result import Fit
-from jaxdamp.identify.start_temperatures import unknown_starts, warmed
 from jaxdamp.rig import Rig
 
 
@@ -172,10 +172,6 @@ class FitResult(AbstractFitted, Fit):
         title += f" ({self.criterion})" if self.criterion else ""
         true = None if truth is None else on_rig(truth, None if self.rig is None else true_rig or Rig())
         return parameter_table(title, self.parameters, true)
-
-    def parameters_table(self) -> Table:
-        """`table()`."""
-        return self.table()
 
     def sensitivity_to_records(self, function: Callable[[PyTree], PyTree]) -> RecordSensitivity:
         """Exact derivatives of a function of the law by the measured forces, through the fit itself.

@@ -18,16 +18,19 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jaxdamp._triangles import unit_columns
 from jaxdamp.bench import clock_jitter, mains_lines
 from jaxdamp.identify.model import is_memoryless
 from jaxdamp.identify.noise import correlation_time
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.residual_patterns import (
     LATE,
+    MEANINGS,
     OF_LAW,
     Pattern,
     Record,
     column,
+    filled,
     hysteresis,
     proportional,
     records_of,
@@ -79,8 +82,7 @@ def left_out(problem: Problem, best: SearchEnd) -> list[str]:
     used = problem.used
     if problem.is_rounding(best.squares) or np.count_nonzero(used) <= 2 * best.values.size:
         return []
-    scale = np.linalg.norm(best.jacobian, axis=0)
-    span = np.linalg.qr(best.jacobian[used] / np.where(scale > 0, scale, 1.0))[0]
+    span = np.linalg.qr(unit_columns(best.jacobian)[0][used])[0]
     residual = span_free(span, -best.residual[used])
     records = list(records_of(problem, best))
     if not records:
@@ -184,17 +186,12 @@ def _is_static(found: _Named) -> bool:
 
 def _late(records: Sequence[Record], residual: np.ndarray, span: np.ndarray) -> list[Pattern]:
     """A delay and a low-pass filter of the force, with the size that explains most."""
-    words = {
-        "delay": "a delay of the force by {:.2g} s",
-        "lag": "a low-pass filter of the force with a time constant of {:.2g} s",
-    }
     effects = []
     for name, change in LATE.items():
-        remedy = f'add "{name}" to the machine (`rig`), or take a law with hysteresis'
-        size, effect = FIRST_SIZE, None
+        size, effect, (words, remedy) = FIRST_SIZE, None, MEANINGS[name]
         for _ in range(REFINED):
             signals = column(records, lambda m, size=size, change=change: change(m, size) / size)
-            effect = Pattern(name, signals, name == "delay", lambda s, text=words[name]: text.format(*s), remedy)
+            effect = Pattern(name, signals, name == "delay", filled(words), remedy)
             found = _explained(effect, span, residual, 1.0)
             if found is None:
                 break
@@ -232,9 +229,8 @@ def _clearest(
 
 def _explained(effect: Pattern, span: np.ndarray, residual: np.ndarray, squares: float) -> _Named | None:
     """What an effect explains of a residual; None if nothing, or if its sign is one that it cannot have."""
-    scale = np.linalg.norm(effect.signals, axis=0)
-    scale = np.where(scale > 0, scale, 1.0)
-    signals = span_free(span, effect.signals / scale)
+    scaled, scale = unit_columns(effect.signals)
+    signals = span_free(span, scaled)
     values, directions = np.linalg.eigh(signals.T @ signals)
     shown = values > OF_ITS_OWN**2
     basis = signals @ directions[:, shown] / np.sqrt(values[shown])

@@ -19,7 +19,7 @@ from jaxdamp.identify.model import law_of, on_rig, rig_of, starts_in
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution
-from jaxdamp.identify.starting import AbstractTrainedStart, Start, started
+from jaxdamp.identify.starting import LearntStart, Start, started
 from jaxdamp.identify.stated import charged_apart
 from jaxdamp.parameters import get, matching, parameters, real, with_values
 from jaxdamp.rig import Rig
@@ -139,8 +139,8 @@ def started_on(law: Start, runs: Sequence[BenchRun], rig: Machine, named: Iterab
     `named` are the parameters to which the call gives bounds, priors, partners or values by record.
     """
     machine = started_machine(rig, runs)
-    bare, trained = without_machine(machine, runs), isinstance(law, AbstractTrainedStart)
-    begin = law.untrained(bare) if isinstance(law, AbstractTrainedStart) else started(law, bare)
+    bare, trained = without_machine(machine, runs), isinstance(law, LearntStart)
+    begin = law.untrained(bare) if isinstance(law, LearntStart) else started(law, bare)
     if machine is not None and holds_static_force(rig) and begin.traits().contains_offset:
         constants = constant_forces(begin)
         stated = any(matching(constants or (), name.removeprefix("law.")) for name in named)

@@ -100,8 +100,7 @@ class ManyFits(AbstractResult):
             must, value = "name a damper that was fitted", f"{self.names[place]!r} ({self.reasons[place]})"
             _checks.refuse("name", must, value, "Take the laws of the others by name: `many[name]`.")
         runs, model = self.records[place], self.free.started_at(self.values[place]).tree
-        warms = law_of(model).traits().temperature_dependent
-        return with_range(with_stated(model, stated_parameters(model, runs)), covered_range(runs, model, warms=warms))
+        return with_range(with_stated(model, stated_parameters(model, runs)), covered_range(runs, model))
 
     @property
     def laws(self) -> tuple[AbstractDamper, ...]:

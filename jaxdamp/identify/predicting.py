@@ -12,10 +12,10 @@ from jaxdamp._tables import Contents, with_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import require_finite_force
-from jaxdamp.identify.estimated_states import with_first_states
 from jaxdamp.identify.initial_states import DRIFT, rest_window, start_of
 from jaxdamp.identify.model import Model, blind_end, initial_state_for, is_memoryless, law_of, of_record, starts_in
 from jaxdamp.identify.printed import predicted as predicted_by_c
+from jaxdamp.identify.record_starts import with_first_states
 from jaxdamp.identify.rows import samples_in_block, settling_samples
 from jaxdamp.identify.traces import Batch, batches
 
@@ -67,19 +67,14 @@ def predict_runs(model: Model, runs: Sequence[BenchRun], initial_state: str = "w
     forces = []
     for run, at in zip(runs, ranges, strict=True):
         force, change = (values[at.row] for values in predicted[at.batch])
-        _refuse_drift(model, run, float(change))
+        if change > DRIFT:
+            law, must = law_of(model), "be one that the law has"
+            value = f"'periodic': over a cycle of {run.name!r} the states of {law} still change by {float(change):.2g}"
+            _checks.refuse("initial_state", must, value, "Pass 'warm_up', or freeze what drifts, such as heat.")
         forces.append(_spread(force[at.start : at.stop], at.block, len(run)))
         used = used_samples(model, run, memoryless, initial_state)
         require_finite_force(law_of(model), forces[-1][used], f"over the record {run.name!r}")
     return forces
-
-
-def _refuse_drift(model: Model, run: BenchRun, change: float) -> None:
-    """Refuse states that have not settled in the periodic solution."""
-    if change > DRIFT:
-        must = "be one that the law has"
-        value = f"'periodic': over a cycle of {run.name!r} the states of {law_of(model)} still change by {change:.2g}"
-        _checks.refuse("initial_state", must, value, "Pass 'warm_up', or freeze what drifts, such as heat.")
 
 
 def predict_by_record(

@@ -13,7 +13,6 @@ from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper, Reach
 from jaxdamp.identify.criteria import FIRST_NOISE, Priors, priors_on
-from jaxdamp.identify.estimated_states import first_states
 from jaxdamp.identify.initial_states import INITIAL_STATES, moving_samples, starts_in_words
 from jaxdamp.identify.machine import Machine, absent_paths, started_on
 from jaxdamp.identify.model import (
@@ -33,10 +32,11 @@ from jaxdamp.identify.model import (
     with_means,
 )
 from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.record_starts import first_states
 from jaxdamp.identify.settings import PROBLEM, ProblemSettings
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.identify.stated import stated_parameters, stated_values, with_stated
-from jaxdamp.identify.traces import batches_of_each, owners, places
+from jaxdamp.identify.traces import batches_of_each, places
 from jaxdamp.parameters import FreeParameters, free_parameters, match_paths, name_patterns, parameters
 
 
@@ -109,8 +109,9 @@ class Beginning(NamedTuple):
             count = sum(np.count_nonzero(part.used()) for part in residuals) if self.priors else 1
             noise = FIRST_NOISE * level / np.sqrt(max(count, 1))
             priors = tuple(replace(prior, noise=jnp.asarray(noise)) for prior in self.priors)
-            owner, where = owners(residuals, ranges), places(residuals, ranges)
-            owner = np.concatenate([owner, *(np.zeros(part.size, owner.dtype) for part in priors)])
+            where, owner = places(residuals, ranges), np.zeros(sum(p.used().size for p in (*residuals, *priors)), int)
+            for number, place in enumerate(where):
+                owner[place] = number
             steps = tuple(at.block / run.sampling_rate for at, run in zip(ranges, runs, strict=True))
             of_records = (level, runs, tuple(deviations), owner, reach, self.law, self.per_record, each, steps, where)
             problem = Problem(self.free, (*residuals, *priors), *of_records, self.initial_state)

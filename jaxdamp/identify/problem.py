@@ -284,7 +284,8 @@ def linearised(
 
     Derivatives by the numbers of sensors need no simulation: they are taken apart, with what the simulation gave.
     """
-    later = np.array([_acts_later(free, p.path) for p in free.owners], bool)
+    groups = zip(free.owners, free.followers, strict=True)  # a number with all that are tied to it
+    later = np.array([all(path.startswith(SENSORS) for path in (p.path, *tied)) for p, tied in groups], bool)
     later &= not later.all()  # where nothing else is free there is nothing to be gained
     first, last = np.flatnonzero(~later), np.flatnonzero(later)
 
@@ -304,11 +305,6 @@ def linearised(
 
     both = jnp.concatenate([jacobian, jax.jacfwd(sensed)(values[last])], axis=1)
     return together, both[:, np.argsort(np.concatenate([first, last]))]
-
-
-def _acts_later(free: FreeParameters, path: str) -> bool:
-    """Whether a free number, and all that are tied to it, act on channels after the simulation."""
-    return all(one.startswith(SENSORS) for one in (path, *[tied for tied, leader in free.ties if leader == path]))
 
 
 def _together(residuals: Sequence[AbstractResiduals], model: PyTree, observed: Sequence[PyTree]) -> Array:

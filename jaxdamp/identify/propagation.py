@@ -20,14 +20,13 @@ from jaxdamp._tables import Column, Table, plain
 from jaxdamp._types import Figure
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, keeps_conditions, laws_inside, without_fitted_ranges
-from jaxdamp.identify.model import count_states, fitted_part, of_law
+from jaxdamp.identify.model import count_states, fitted_part, of_law, with_means
 from jaxdamp.identify.noise import Noise
 from jaxdamp.identify.printed import evaluator
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.rows import on_device
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.traces import Batch
-from jaxdamp.parameters import get, with_values
 from jaxdamp.rig import march, quasi_static
 
 
@@ -53,9 +52,8 @@ class Evidence(NamedTuple):
 
     def model(self, values: Float[Array, " free"]) -> PyTree:
         """The law, vehicle or model with these values, without fitted range; where each record has one, their mean."""
-        model = self.problem.free.build(values)
-        means = {path: jnp.mean(get(model, path)) for path in self.problem.per_record}
-        return without_fitted_ranges(fitted_part(with_values(model, means) if means else model))
+        model = with_means(self.problem.free.build(values), self.problem.per_record)
+        return without_fitted_ranges(fitted_part(model))
 
     @property
     def quantile(self) -> float:

@@ -15,8 +15,7 @@ from jaxdamp.dampers import (
     laws_inside,
     with_standard_errors,
 )
-from jaxdamp.identify.recommending import NEARLY, judged_on_held_out, recommendation
-from jaxdamp.identify.rungs import Failure, Rung
+from jaxdamp.identify.rungs import NEARLY, Failure, Rung, judged_on_held_out, recommendation
 from jaxdamp.parameters import nonnegative, parameters, with_values
 
 
@@ -155,8 +154,8 @@ def _without_doubt(source: Rung, enough: float, most: float, fitted: Fitted, ahe
             for other in others[: len(failed) < MOST_FAILURES - 1]:
                 following = (*left_out, other.words)
                 begun[following] = begun.get(following) or ahead(source, *_with_held(other.law, fastest))
-            known = begun.get((*left_out, part.words))
-            rung = _fitted_with_less(source, part.law, fastest, _as_begun(known) if known else fitted)
+            known, (law, held) = begun.get((*left_out, part.words)), _with_held(part.law, fastest)
+            rung = _as_reduced(source, known() if known else fitted(source, law, held), held)
             if rung and not rung.doubt and rung.error <= most:
                 nearly, most = rung, rung.error
             if rung and rung.error <= enough:
@@ -170,14 +169,8 @@ def _without_doubt(source: Rung, enough: float, most: float, fitted: Fitted, ahe
     return nearly
 
 
-def _as_begun(begun: Begun) -> Fitted:
-    return lambda source, law, held: begun()
-
-
-def _fitted_with_less(source: Rung, law: AbstractDamper, fastest: float, fitted: Fitted) -> Rung | None:
+def _as_reduced(source: Rung, rung: Rung | Failure, held: tuple[str, ...]) -> Rung | None:
     """The fit of a law with less in it, which says what it is, and that no record determines what is held."""
-    law, held = _with_held(law, fastest)
-    rung = fitted(source, law, held)
     if isinstance(rung, Failure):
         return None
     law = rung.result.law

@@ -22,6 +22,23 @@ SHORT = 50.0  # sampling steps for each time constant below which a filter and a
 OF_LAW = ("curve", "hysteresis")  # effects that no machine has
 FREE_CURVES = (PiecewiseLinear, SplineTable, Table)
 PLAY = "look for play in the mounts, or put the law into `Play`"
+SIGNED = ("offset", "heat", "drift")  # effects of either sign
+MEANINGS = {  # what an effect is, with its size, and what to do
+    "offset": ("a constant force of {:.3g} N", 'add "gas" or "offset" to the machine (`rig`)'),
+    "gas_stiffness": ("a spring of {:.3g} N/m", 'add "gas_stiffness" to the machine (`rig`), or a `Spring` to the law'),
+    "mass": ("a moving mass of {:.3g} kg", 'add "mass" to the machine (`rig`)'),
+    "friction": ("friction of {:.3g} N", 'add "friction" to the machine (`rig`), or take a law with friction'),
+    "heat": ("damping that falls as the oil warms up", 'add "heat" to the machine (`rig`), or cut the records'),
+    "drift": (
+        "a zero that drifts by {:.3g} N/s",
+        "let the bench warm up, and set the load cell to zero before each record",
+    ),
+    "delay": ("a delay of the force by {:.2g} s", 'add "delay" to the machine (`rig`), or take a law with hysteresis'),
+    "lag": (
+        "a low-pass filter of the force with a time constant of {:.2g} s",
+        'add "lag" to the machine (`rig`), or take a law with hysteresis',
+    ),
+}
 
 Values = Float[np.ndarray, " samples"]
 
@@ -80,6 +97,11 @@ def records_of(problem: Problem, best: SearchEnd) -> Iterator[Record]:
         yield Record(i, place[at], weight[at], motion, cycle if at.size >= 2 * cycle else 0)
 
 
+def filled(text: str) -> Callable[[np.ndarray], str]:
+    """The text with the sizes of an effect in it."""
+    return lambda sizes: text.format(*sizes)
+
+
 def column(records: Sequence[Record], change: Callable[[Motion], Values]) -> Float[np.ndarray, "samples 1"]:
     """The weighted change of the force [N] by an effect, over all used samples."""
     values = np.zeros((sum(record.at.size for record in records), 1))
@@ -90,59 +112,22 @@ def column(records: Sequence[Record], change: Callable[[Motion], Values]) -> Flo
 
 def proportional(problem: Problem, records: Sequence[Record]) -> list[Pattern]:
     """The effects of a machine that are proportional to their size, the likelier ones first."""
-    machine = 'add "{}" to the machine (`rig`)'
-    kinds: list[tuple[str, bool, str, str, Callable[[Motion], Values]]] = [
-        (
-            "offset",
-            True,
-            "a constant force of {:.3g} N",
-            f'add "gas" or {machine.format("offset")[4:]}',
-            lambda motion: np.ones_like(motion.time),
-        ),
-        (
-            "gas_stiffness",
-            False,
-            "a spring of {:.3g} N/m",
-            f"{machine.format('gas_stiffness')}, or a `Spring` to the law",
-            lambda m: m.stroke,
-        ),
-        (
-            "mass",
-            False,
-            "a moving mass of {:.3g} kg",
-            machine.format("mass"),
-            lambda m: np.gradient(m.velocity, m.time),
-        ),
-        (
-            "friction",
-            False,
-            "friction of {:.3g} N",
-            f"{machine.format('friction')}, or take a law with friction",
-            lambda m: np.tanh(m.velocity / FRICTION_VELOCITY),
-        ),
-        (
-            "heat",
-            True,
-            "damping that falls as the oil warms up",
-            f"{machine.format('heat')}, or cut the records",
-            _heated,
-        ),
-        (
-            "drift",
-            True,
-            "a zero that drifts by {:.3g} N/s",
-            "let the bench warm up, and set the load cell to zero before each record",
-            lambda m: m.time,
-        ),
-    ]
-    amplitude = problem.reach.stroke
+    changes: dict[str, Callable[[Motion], Values]] = {
+        "offset": lambda m: np.ones_like(m.time),
+        "gas_stiffness": lambda m: m.stroke,
+        "mass": lambda m: np.gradient(m.velocity, m.time),
+        "friction": lambda m: np.tanh(m.velocity / FRICTION_VELOCITY),
+        "heat": _heated,
+        "drift": lambda m: m.time,
+    }
+    patterns = []
+    for name, change in changes.items():
+        words, remedy = MEANINGS[name]
+        patterns.append(Pattern(name, column(records, change), name in SIGNED, filled(words), remedy))
     for gap in GAPS:
-        words = f"a clearance of about {1e3 * gap * amplitude:.2g} mm (no force after each reversal)"
-        kinds.append(("clearance", False, words, PLAY, lambda m, gap=gap * amplitude: _lost(m, gap)))
-    patterns = [
-        Pattern(name, column(records, change), signed, lambda sizes, words=words: words.format(*sizes), remedy)
-        for name, signed, words, remedy, change in kinds
-    ]
+        words = f"a clearance of about {1e3 * gap * problem.reach.stroke:.2g} mm (no force after each reversal)"
+        lost = column(records, lambda m, gap=gap * problem.reach.stroke: _lost(m, gap))
+        patterns.append(Pattern("clearance", lost, False, filled(words), PLAY))
     return [*patterns, *_gains(problem, records), _curve(problem, records)]
 
 

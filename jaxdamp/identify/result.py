@@ -2,28 +2,21 @@
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float, PyTree
 
-from jaxdamp._results import AbstractResult, Derived
+from jaxdamp._results import AbstractResult
 from jaxdamp._status import Status
 from jaxdamp._tables import Contents, Table, plain
 from jaxdamp.identify.bayes import Posterior, posterior
-from jaxdamp.identify.estimates import Estimate, Minimum, describe, parameter_table, rounded
+from jaxdamp.identify.estimates import Estimate, Minimum, describe, rounded
 from jaxdamp.identify.profile import ProfileCurve, profile_curve
 from jaxdamp.identify.propagation import Evidence, Propagated, propagate
 
 
-class AbstractModelResult(AbstractResult):
-    """A result whose `model` is what was fitted: with the minimum's values, unless a class says more."""
-
-    model: Any = Derived(lambda self: self._evidence.model(self._evidence.minimum.values))
-
-
 @dataclasses.dataclass(frozen=True, repr=False, kw_only=True)
-class Fit(AbstractModelResult):
+class Fit(AbstractResult):
     """A model fitted to records or numbers, with the uncertainty of its parameters.
 
     Attributes:
@@ -123,12 +116,7 @@ class Fit(AbstractModelResult):
 
     def parameters_table(self) -> Table:
         """The fitted numbers with units, standard errors and meanings."""
-        return parameter_table(f"Parameters of {type(self.model).__name__}", self.parameters)
-
-    def tables(self) -> dict[str, Table]:
-        """The table of the result, and the fitted numbers."""
-        table, parameters = self.table(), self.parameters_table()
-        return {"table": table} if table == parameters else {"table": table, "parameters": parameters}
+        return self.table()
 
     def content(self) -> Contents:
         """Parameters and their covariance as plain data, and what was minimised in words."""

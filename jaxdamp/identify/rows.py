@@ -57,14 +57,12 @@ def refuse_units(runs: Sequence[BenchRun]) -> None:
         _checks.refuse("runs", "have their commands in one unit", named, "Fit those with one unit.")
 
 
-def settling_time(run: BenchRun) -> float:
-    """Settling time [s] at the start of a record, half a cycle, after which the initial states no longer matter."""
-    return min(np.pi / dominant_rate(run), 0.25 * run.duration)
-
-
 def settling_samples(run: BenchRun, dt: float) -> int:
-    """Samples, `dt` [s] apart, of the settling time; a whole number of them stays one however it is rounded."""
-    return int(np.ceil(settling_time(run) / dt - 1e-6))
+    """Samples, `dt` [s] apart, of half a cycle at the start, after which the initial states no longer matter.
+
+    A whole number of them stays one however it is rounded.
+    """
+    return int(np.ceil(min(np.pi / dominant_rate(run), 0.25 * run.duration) / dt - 1e-6))
 
 
 def _with_warm_up(run: BenchRun, count: int, channels: Sequence[str]) -> list[np.ndarray]:

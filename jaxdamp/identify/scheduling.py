@@ -213,7 +213,8 @@ def fit_scheduled(
     with Progress("Fitting by setting") as line:
         shown = progress or line
         alone = chain.alone(chain.settings, shown)
-        choice = Choice(blend, f"Chosen by the call: blend={blend!r}.") if blend else chain.choice(alone)
+        stated = Choice(blend, f"Chosen by the call: blend={blend!r}.") if blend else None
+        choice = stated or choose_blend(alone, how["initial_state"])
         shown("all settings as one law")
         return ScheduledFit(chain.together(alone, choice.blend), alone, choice, chain)
 
@@ -253,10 +254,6 @@ class Chain:
         """The records of one setting."""
         return [run for run in self.runs if run.command == setting]
 
-    def held(self, settings: Iterable[float]) -> list[BenchRun]:
-        """The records of these settings."""
-        return [run for setting in settings for run in self.at(setting)]
-
     def alone(self, settings: Sequence[float], shown: Callable[[str], None]) -> Alone:
         """The best fit at each of these settings: from its own start, or from the neighbour below or above."""
         for setting in settings:
@@ -288,10 +285,6 @@ class Chain:
         open_numbers = undetermined(problem, solution.best)
         return AtSetting(law_of(model), rig_of(model), problem.runs, *errors, solution.closed_form, open_numbers)
 
-    def choice(self, alone: Alone) -> Choice:
-        """What lies between the settings, by what the fits at each show."""
-        return choose_blend(alone, self.how["initial_state"])
-
     def together(self, alone: Alone, blend: str) -> FitResult:
         """The fit of all records of these settings as one law, from the laws of each.
 
@@ -313,7 +306,7 @@ class Chain:
         scheduled = Scheduled(blended, list(alone), min(alone), "parameters" if at_levels else "force")
         held = held_constant_forces(scheduled, machine)
         how: FitSettings = {**self.how, "starts": 1, "tie": tie, "freeze": [*self.how["freeze"], *held]}
-        result = fit(scheduled, [*self.held(alone), *varying], rig=machine, **how)
+        result = fit(scheduled, [*itertools.chain(*map(self.at, alone)), *varying], rig=machine, **how)
         return with_blended_forces(result) if at_levels and blend == "force" else result
 
     def _tied_at(self, at: AtSetting, level: str) -> dict[str, str]:

@@ -15,6 +15,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float
 
+from jaxdamp._jacobian import with_jacobian
 from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._status import Status
 from jaxdamp._triangles import triangle
@@ -186,13 +187,7 @@ def condition_margins(
     if not any(law.has_conditions() for _, law in laws_inside(coordinates.free.tree)):
         none = jnp.zeros((0, y.size), y.dtype)
         return none[:, 0], none
-
-    def margins_of(y: Array) -> tuple[Array, Array]:
-        of_law = margins(coordinates.free.build(coordinates.to_physical(y)))
-        return of_law, of_law
-
-    slopes, of_law = jax.jacfwd(margins_of, has_aux=True)(y)
-    return of_law, slopes
+    return with_jacobian(lambda y: margins(coordinates.free.build(coordinates.to_physical(y))))(y)
 
 
 def _search_unbounded(problem: Problem, max_steps: int, solver: Solver) -> SearchEnd:

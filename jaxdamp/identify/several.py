@@ -9,15 +9,15 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from jaxdamp._status import Status
 from jaxdamp.dampers import Reach, keeps_conditions, laws_inside
 from jaxdamp.identify.estimates import Minimum
-from jaxdamp.identify.first_part import first_part
 from jaxdamp.identify.printed import evaluator
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd, Searches, Solver, search
+from jaxdamp.identify.traces import signals
 from jaxdamp.parameters import FreeParameters
 
 
@@ -32,6 +32,12 @@ ELSEWHERE = 50.0  # squares of the change of force, relative to what they gain, 
 SAME = 1.0  # largest difference in chi-square of two ends of the same minimum
 WORTH_A_ROUND = 1e-3  # relative decrease of the sum of squares after which there is another round
 BETTER = 1e-9  # relative decrease of the sum of squares that counts as one
+# of the first part of long records, on which starts are compared: the whole motion in a fraction of the samples
+SHARE = 0.25  # of the samples of a record, at least
+REACHED = 0.95  # of the range of stroke and velocity, which it covers
+MOVING = 0.1  # of its largest velocity, at which its motion begins
+MOST = 0.5  # share of all samples, above which it is not worthwhile
+LEAST = 4000  # samples, below which a search is short anyway
 
 
 class Solution(NamedTuple):
@@ -66,35 +72,56 @@ def other_starts(free: FreeParameters, reach: Reach) -> list[Float[np.ndarray, "
     return starts
 
 
+def first_part(problem: Problem) -> Problem | None:
+    """The problem on the first part of each record, or None where that is hardly shorter.
+
+    What is left of a record weighs as much as the whole record, so that sums of squares and priors stay comparable.
+    """
+    used, factor = problem.used, np.ones(problem.used.size)
+    stroke, velocity = signals(problem.residuals, "stroke", "velocity")
+    for place in problem.places:
+        factor[place] = _of_record(used[place], stroke[place], velocity[place])
+    count, kept = np.count_nonzero(used), np.count_nonzero(used & (factor > 0))
+    return problem.reweighted(factor) if count >= LEAST and kept <= MOST * count else None
+
+
+def _of_record(
+    used: Bool[np.ndarray, " time"], stroke: Float[np.ndarray, " time"], velocity: Float[np.ndarray, " time"]
+) -> Float[np.ndarray, " time"]:
+    """Factor on the weights: zero after the first part."""
+    if not np.any(used):
+        return np.ones(used.size)
+    samples, moving = np.flatnonzero(used), used & (np.abs(velocity) > MOVING * np.abs(velocity[used]).max())
+    rest = np.count_nonzero(samples < np.argmax(moving))
+    last = samples[rest + int(SHARE * (samples.size - rest - 1))]
+    for signal in (stroke, velocity):
+        for way in (signal, -signal):
+            low, high = way[used].min(), way[used].max()
+            last = max(last, samples[np.argmax(way[used] >= low + REACHED * (high - low))])
+    kept = np.arange(used.size) <= last
+    return np.where(kept, np.sqrt(samples.size / np.count_nonzero(used & kept)), 0.0)
+
+
 class _Searcher:
     """Searches from several starts: whole ones on all samples, first looks on the first part of long records."""
 
     def __init__(self, problem: Problem, solver: Solver | None, starts: int | None) -> None:
-        self.problem, self._whole, self._part = problem, Searches(problem, solver), None
-        if starts != 1 and self._whole.is_printed and (part := first_part(problem)):
-            self._part = self._whole.of(part, evaluator(part.free, part.residuals))
-
-    @property
-    def takes_part(self) -> bool:
-        """Whether a look sees a part of the samples."""
-        return self._part is not None
+        self.problem, self.whole, self.part = problem, Searches(problem, solver), None
+        if starts != 1 and self.whole.is_printed and (part := first_part(problem)):
+            self.part = self.whole.of(part, evaluator(part.free, part.residuals))
 
     def look(self, values: Float[np.ndarray, " free"], steps: int) -> SearchEnd:
         """The end of a few steps, to be compared with those of other looks; none on a part of the samples is final."""
-        if self._part is None:
-            return self.end(values, steps)
-        return self._part.end(values, steps)._replace(status=Status.STEP_LIMIT)
-
-    def end(self, values: Float[np.ndarray, " free"], steps: int) -> SearchEnd:
-        """The end of a search on all samples."""
-        return self._whole.end(values, steps)
+        if self.part is None:
+            return self.whole.end(values, steps)
+        return self.part.end(values, steps)._replace(status=Status.STEP_LIMIT)
 
     def to_its_end(self, end: SearchEnd, max_steps: int) -> SearchEnd:
         """The end of a search on all samples that went fewer steps than it may take."""
         left = max_steps - end.steps
         if end.converged or left < 1:
             return end
-        on = self.end(end.values, left)
+        on = self.whole.end(end.values, left)
         return on._replace(steps=end.steps + on.steps)
 
 
@@ -105,7 +132,7 @@ def search_from(problem: Problem, *, starts: int | None, max_steps: int, solver:
     wrong at the start.
     """
     searcher, begin = _Searcher(problem, solver, starts), np.asarray(problem.free.values)
-    best = searcher.end(begin, max_steps if starts == 1 else min(FOLLOWED_STEPS, max_steps))
+    best = searcher.whole.end(begin, max_steps if starts == 1 else min(FOLLOWED_STEPS, max_steps))
     ends, tried = [best], [begin]
     for _ in range(ROUNDS):
         if len(tried) == starts or (best.converged and problem.is_rounding(best.squares)):
@@ -166,18 +193,18 @@ def _follow(searcher: _Searcher, others: Sequence[np.ndarray], best: SearchEnd, 
     """The ends of a few steps from each of several starts, and of the whole search from the most promising."""
     if not others:
         return []
-    steps = min(FIRST_LOOK, max_steps)
-    here = searcher.look(best.values, steps) if searcher.takes_part else best
+    steps, partly = min(FIRST_LOOK, max_steps), searcher.part is not None
+    here = searcher.look(best.values, steps) if partly else best
     looks, known = [searcher.look(values, steps) for values in others], [(here, best)]
     variance = here.squares / np.count_nonzero(searcher.problem.used)
-    if searcher.takes_part and _left(best, here, searcher.look(best.values, 1).squares, variance):
+    if partly and _left(best, here, searcher.look(best.values, 1).squares, variance):
         looks, known = [here, *looks], []
     ends = [end for end in looks if end.converged]
     for look in _promising(here, looks)[:FOLLOWED]:
         end = next((end for seen, end in known if seen.finite and _apart(look, seen) < SAME * variance), None)
         if end is None:
             # at least one point on all samples
-            most = np.clip(max_steps, look.steps + searcher.takes_part, look.steps + FOLLOWED_STEPS)
+            most = np.clip(max_steps, look.steps + partly, look.steps + FOLLOWED_STEPS)
             end = searcher.to_its_end(look, int(most))
             known.append((look, end))
         ends.append(end)

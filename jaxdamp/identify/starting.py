@@ -1,37 +1,90 @@
 """Starts of a fit: a law, a class of laws, or a function that makes a law from records."""
 
+import dataclasses
 import inspect
 import warnings
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, final
 
 import equinox as eqx
+import jax
 import numpy as np
 
 from jaxdamp import _checks, dampers
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import AbstractDamper, from_samples, without_fitted_ranges
+from jaxdamp.dampers import AbstractDamper, Linear, NeuralHysteresis, Spring, from_samples, without_fitted_ranges
 
 
-class AbstractTrainedStart(ABC):
-    """A function of records that trains a law, of which a fit then changes only a part."""
+if TYPE_CHECKING:
+    from jaxdamp.identify.training import Training
 
-    @property
-    @abstractmethod
-    def freeze(self) -> tuple[str, ...]:
-        """The parameters that a fit holds at the values of the training."""
 
-    @abstractmethod
-    def untrained(self, runs: Sequence[BenchRun]) -> AbstractDamper:
-        """The law before its training."""
-
-    @abstractmethod
-    def __call__(self, runs: Sequence[BenchRun]) -> AbstractDamper:
-        """The trained law."""
-
+WEIGHTS = ("hidden_weights", "hidden_biases", "output_weights", "output_biases")
+KEYS = 3
+STEPS, PATIENCE, LEARNING_RATE = 300, 100, 0.05  # of the training
+SAMPLES_PER_CYCLE = 100
+TRAINED_ON = 0.7  # of a single record, whose rest decides when the training stops
 
 Start = AbstractDamper | type[AbstractDamper] | Callable[..., AbstractDamper]
+
+
+@final
+@dataclasses.dataclass(frozen=True)
+class LearntStart:
+    """`Linear + NeuralHysteresis + Spring`, trained on the records that a fit gives it, as a start for this fit.
+
+    The record of middle peak velocity decides, as a whole, when to stop the training and which key of the random
+    weights is best; the law is trained on all others. Of a single record the last 30 % of its time decide. A fit that
+    starts from here changes only the coefficient, the stiffnesses and the spring; the weights stay, since a fit to all
+    records would undo the early stopping. The same records and keys give the same law. `cross_validate` trains without
+    the record that it holds out.
+
+    Arguments:
+        keys: number of random starts, keys 0, 1, ....
+        options: passed on to `train`.
+
+    >>> LearntStart(keys=2).freeze[0]
+    'hidden_weights'
+    """
+
+    keys: int = KEYS
+    options: dict[str, Any] = dataclasses.field(default_factory=dict)
+
+    @property
+    def freeze(self) -> tuple[str, ...]:
+        """The parameters that a fit holds at the values of the training."""
+        return WEIGHTS
+
+    def __call__(self, runs: Sequence[BenchRun]) -> AbstractDamper:
+        """The law of the key with the smallest error on the record to stop by."""
+        return min(self.trainings(runs), key=lambda training: training.held_out_rmse).law
+
+    def trainings(self, runs: Sequence[BenchRun]) -> "list[Training]":
+        """The training from each key."""
+        from jaxdamp.identify.training import train  # which starts from here
+
+        runs = list({run.fingerprint: run for run in runs}.values())  # a copy would be no record to stop by
+        if len(runs) == 1:
+            time = runs[0].time
+            middle = float(time[round(TRAINED_ON * len(time))])
+            runs = [runs[0].between(float(time[0]), middle), runs[0].between(middle, np.inf)]
+            stop = 1
+        else:
+            stop = sorted(range(len(runs)), key=lambda i: runs[i].peak_velocity)[len(runs) // 2]
+        rest = [run for i, run in enumerate(runs) if i != stop]
+        how: dict[str, Any] = {"steps": STEPS, "patience": PATIENCE, "learning_rate": LEARNING_RATE}
+        how |= {"weighting": "runs", "samples_per_cycle": SAMPLES_PER_CYCLE, "bad_records": "keep"} | self.options
+        return [train(self.untrained(rest, key), rest, held_out=runs[stop], **how) for key in range(self.keys)]
+
+    def untrained(self, runs: Sequence[BenchRun], key: int = 0) -> AbstractDamper:
+        """A third of the damping in one coefficient, random weights, and the spring of the records."""
+        velocity, force, stroke = (
+            np.concatenate([getattr(run, channel) for run in runs]) for channel in ("velocity", "force", "stroke")
+        )
+        speed, level = (float(np.sqrt(np.mean(values**2))) for values in (velocity, force))
+        network = NeuralHysteresis.random(jax.random.key(key), velocity_scale=speed, force_scale=level)
+        rate = float(np.asarray(Linear.guess(velocity, force).rate)) / 3.0
+        return Linear(rate) + network + Spring.guess(velocity, force, stroke)
 
 
 def started(law: Start, runs: Sequence[BenchRun]) -> AbstractDamper:
@@ -53,7 +106,7 @@ def started(law: Start, runs: Sequence[BenchRun]) -> AbstractDamper:
 
 def frozen_by(law: Start) -> tuple[str, ...]:
     """The parameters that a start asks a fit to hold."""
-    return law.freeze if isinstance(law, AbstractTrainedStart) else ()
+    return law.freeze if isinstance(law, LearntStart) else ()
 
 
 def check_start(argument: str, law: object) -> None:

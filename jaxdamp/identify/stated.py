@@ -148,12 +148,9 @@ def followed_channels(model: Model, runs: Sequence[BenchRun]) -> list[str]:
         refuse_units(runs)
         for run in runs:
             check_commands(f"command of {run.name!r}", law, channel(run, "command"))
-    of_rig = rig is not None and (
-        np.any(np.asarray(rig.temperature_slope)) or np.any(np.asarray(rig.gas_temperature_slope))
-    )
-    if not (of_rig or law.traits().temperature_dependent):
-        return channels + varying
-    if all(run.temperature is None for run in runs):
+    slopes = () if rig is None else (rig.temperature_slope, rig.gas_temperature_slope)
+    warms = law.traits().temperature_dependent or any(np.any(np.asarray(slope)) for slope in slopes)
+    if not warms or all(run.temperature is None for run in runs):
         return channels + varying
     refuse_lacking("temperature", [run for run in runs if run.temperature is None], APART)
     return [*channels, "temperature", *varying]

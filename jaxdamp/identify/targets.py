@@ -19,6 +19,7 @@ from jaxdamp._tables import Column, Contents, Table, plain
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import Reach, without_fitted_ranges
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, priors_on, solve_by
+from jaxdamp.identify.estimates import parameter_table
 from jaxdamp.identify.estimating import estimate
 from jaxdamp.identify.judging import MOST_WARNINGS, fields_of_fit, on_status
 from jaxdamp.identify.noise import Noise, independent
@@ -90,6 +91,10 @@ class TargetFit(Fit):
     def summary(self) -> str:
         """How many targets are met."""
         return f"{sum(t.met for t in self.targets)} of {len(self.targets)} targets are met."
+
+    def parameters_table(self) -> Table:
+        """The fitted numbers with units, standard errors and meanings."""
+        return parameter_table(f"Parameters of {type(self.model).__name__}", self.parameters)
 
     def tables(self) -> dict[str, Table]:
         """Targets, and parameters."""

@@ -257,11 +257,3 @@ def signals(residuals: Sequence[AbstractResiduals], *names: str) -> list[Float[n
     """Channels or weights at the samples of all residuals of bench records."""
     made = [part for part in residuals if isinstance(part, Batch)]
     return [np.concatenate([np.ravel(np.asarray(getattr(batch, name))) for batch in made]) for name in names]
-
-
-def owners(made: Sequence[Batch], ranges: Sequence[SampleRange]) -> Int[np.ndarray, " samples"]:
-    """The number of the record that each sample of the residuals belongs to."""
-    numbers = np.zeros(sum(batch.weight.size for batch in made), dtype=int)
-    for i, place in enumerate(places(made, ranges)):
-        numbers[place] = i
-    return numbers

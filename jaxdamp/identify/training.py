@@ -195,9 +195,8 @@ def train(
     rule = _adam(learning_rate, steps) if optimiser is None else optimiser
     course = _course(coordinates, problem, checked, rule, steps, patience)
     fitted = np.isfinite(problem.sigma)
-    warms = problem.law.traits().temperature_dependent
     trained = _model(coordinates, course.best)
-    trained = with_range(trained, covered_range(problem.fitted_to, trained, warms=warms))
+    trained = with_range(trained, covered_range(problem.fitted_to, trained))
     percent, rmse, scores = score(trained, runs, fitted)
     held_percent, held_rmse, held_scores = score(trained, held_out)
     rate = f"`learning_rate` ({learning_rate:g})" if optimiser is None else "the learning rate of `optimiser`"

@@ -11,14 +11,13 @@ from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
 from jaxdamp._progress import Progress
 from jaxdamp._results import drawn_by
-from jaxdamp._tables import Cell, Column, Contents, Table, with_unit
+from jaxdamp._tables import Column, Table
 from jaxdamp.bench import RideRecord
 from jaxdamp.identify.comparison import AbstractComparison, naming_only, side_by_side
 from jaxdamp.identify.held_out import PARTS, REFIT_STEPS, anchored_at
 from jaxdamp.identify.model import VehicleTest
 from jaxdamp.identify.problem import Problem
-from jaxdamp.identify.recommending import doubt_of, why
-from jaxdamp.identify.rungs import Failure
+from jaxdamp.identify.rungs import Failure, doubt_of, why
 from jaxdamp.identify.search import search
 from jaxdamp.identify.vehicle_fitting import fit_vehicle
 from jaxdamp.identify.vehicle_preparing import checked_records
@@ -112,6 +111,10 @@ class VehicleComparison(AbstractComparison[VehicleRung, RideRecord]):
     """Vehicles fitted to the same drives, in the order given."""
 
     kind: ClassVar[str] = "vehicle"
+    _title: ClassVar[str] = (
+        "Vehicles (errors as multiples of the smallest that any of them leaves in the fitted drives)"
+    )
+    _error: ClassVar[Column] = Column("error", spec=".3g")
 
     @classmethod
     def of(cls, outcomes: Iterable[VehicleRung | Failure], held_out: Iterable[RideRecord] = ()) -> "VehicleComparison":
@@ -139,24 +142,6 @@ class VehicleComparison(AbstractComparison[VehicleRung, RideRecord]):
             f" that any vehicle leaves in the fitted drives ({best.judged_on})."
         )
         return (text, *why(self.recommendation, self.rungs, self.kind))
-
-    def table(self) -> Table:
-        """Each vehicle with its number of free parameters, its errors and remarks."""
-        columns = [Column("vehicle"), Column("free", spec="d"), Column("fit", "%", ".1f"), Column("error", spec=".3g")]
-        columns += [Column("held-out fit", "%", ".1f"), Column("held-out error", spec=".3g"), Column("note")]
-        rows: list[tuple[Cell, ...]] = []
-        for r in self.rungs:
-            note = ", ".join(filter(None, ["recommended" * (r is self.best), r.doubt]))
-            errors = r.fit_percent, r.rmse, r.held_out_fit_percent, r.held_out_rmse
-            rows.append((r.name, r.parameters, *errors, note))
-        rows += [(failure.name, *[None] * (len(columns) - 2), "failed") for failure in self.failed]
-        title = "Vehicles (errors as multiples of the smallest that any of them leaves in the fitted drives)"
-        return Table(title, tuple(columns), tuple(rows))
-
-    def held_out_errors(self, rung: VehicleRung) -> Contents:
-        """The errors of a vehicle on drives left out, as plain data."""
-        errors = {"held_out_fit": (rung.held_out_fit_percent, "%"), "held_out_error": (rung.held_out_rmse, "")}
-        return {name: with_unit(*error) for name, error in errors.items()}
 
     plot = drawn_by("ladder", "The errors of the vehicles side by side.")
 

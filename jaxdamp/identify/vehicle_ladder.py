@@ -31,11 +31,6 @@ class Place(NamedTuple):
     friction: AbstractDamper | None  # what it has of friction
     force: float  # sliding friction [N] to start from
 
-    @property
-    def could_give(self) -> bool:
-        """Whether its friction does not give before it slides yet, and there is a force to start from."""
-        return not isinstance(self.friction, Dahl | LuGre) and self.force > 0.0
-
     def with_form(self, form: str, give: float | None = None) -> AbstractDamper | None:
         """The law with this form of friction.
 

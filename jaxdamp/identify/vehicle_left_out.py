@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from jaxdamp.bench import RideRecord
+from jaxdamp.dampers import Dahl, LuGre
 from jaxdamp.identify.model import VehicleTest
 from jaxdamp.identify.noise import channel_noise
 from jaxdamp.identify.problem import Problem
@@ -207,7 +208,8 @@ def friction_left_out(problem: Problem, end: SearchEnd) -> Friction | None:
     Of dry friction and friction that gives by 0.1, 0.3 or 1 mm that with the least squares is named, friction that
     gives only where it leaves clearly less than dry friction.
     """
-    places = [place for place in friction_places(problem.free.tree.vehicle) if place.could_give]
+    everywhere = friction_places(problem.free.tree.vehicle)
+    places = [place for place in everywhere if place.force > 0.0 and not isinstance(place.friction, Dahl | LuGre)]
     dry = _friction(problem, end, places, None) if all(place.friction is None for place in places) else None
     giving = [one for give in GIVES if (one := _friction(problem, end, places, give)) is not None]
     best = min(giving, key=lambda friction: friction.left, default=None)

@@ -84,8 +84,8 @@ class VehicleData(NamedTuple):
             np.broadcast_to(np.array([number[c] for c in b.channels])[None, :, None], b.weight.shape).ravel()
             for b in rides
         ]
-        forces, paths = bench_parts(self.model, self.benches, sigma, self.samples_per_cycle)
-        owner += [len(self.channels) - len(self.benches) + numbers for numbers in paths]
+        forces = bench_parts(self.model, self.benches, sigma, self.samples_per_cycle)
+        owner += [np.full(part.batch.weight.size, number[part.path]) for part in forces]
         weighted = [np.ravel(b.measured * b.weight) for b in rides]
         weighted += [np.ravel(part.batch.force * part.batch.weight) for part in forces]
         level = float(np.sqrt(sum(np.sum(np.square(values)) for values in weighted)))

@@ -18,7 +18,7 @@ from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.model import VehicleTest, on_rig
 from jaxdamp.identify.residuals import AbstractResiduals, AbstractWeighted
-from jaxdamp.identify.traces import Batch, batches, owners
+from jaxdamp.identify.traces import Batch, batches
 from jaxdamp.parameters import get, with_values
 from jaxdamp.rig import Sensor
 from jaxdamp.roads import AbstractRoad
@@ -170,15 +170,13 @@ def ride_batches(
 
 def bench_parts(
     model: VehicleTest, benches: Mapping[str, Sequence[BenchRun]], sigma: Mapping[str, float], per_cycle: int | None
-) -> tuple[list[DamperOnBench], list[Int[np.ndarray, " samples"]]]:
-    """The residuals of bench records by the path of the law, and for each sample the number of its path."""
-    parts, numbers = [], []
-    for number, (path, runs) in enumerate(benches.items()):
+) -> list[DamperOnBench]:
+    """The residuals of bench records by the path of the law."""
+    parts = []
+    for path, runs in benches.items():
         law = on_rig(get(model.vehicle, path), model.rig)
-        of_path, ranges = batches(law, runs, [sigma[path]] * len(runs), per_cycle)
-        parts += [DamperOnBench(batch, path) for batch in of_path]
-        numbers.append(np.full(owners(of_path, ranges).size, number))
-    return parts, numbers
+        parts += [DamperOnBench(batch, path) for batch in batches(law, runs, [sigma[path]] * len(runs), per_cycle)[0]]
+    return parts
 
 
 class VirtualRideSettings(SimulationSettings, total=False):

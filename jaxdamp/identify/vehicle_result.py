@@ -153,10 +153,6 @@ class VehicleFit(Fit):
         """The errors of each channel of each record."""
         return table_of_scores("Channels", "record", self.scores)
 
-    def parameters_table(self) -> Table:
-        """`table()`."""
-        return self.table()
-
     def tables(self) -> dict[str, Table]:
         """Parameters, and the errors of the channels."""
         return {"parameters": self.table(), "scores": self.scores_table()}

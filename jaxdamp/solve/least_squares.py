@@ -19,6 +19,7 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float, Int, PyTree
 
 from jaxdamp import _checks
+from jaxdamp._jacobian import with_jacobian
 from jaxdamp._status import Status
 from jaxdamp._triangles import triangle
 from jaxdamp._types import ScalarLike
@@ -204,12 +205,8 @@ def _pull_within_bounds(optimum: PyTree, _: PyTree, inputs: PyTree) -> PyTree:
     """What is zero at the solution: the gradient, or the distance from a bound."""
     fn, solver, _, args, *_ = inputs
     flat, unravel = ravel_pytree(optimum)
-
-    def residual(flat: Array) -> tuple[Array, Array]:
-        missed = ravel_pytree(fn(unravel(flat), args)[0])[0]
-        return missed, missed
-
-    jacobian, missed = jax.jacfwd(residual, has_aux=True)(flat)  # forwards, as in the search: the unknowns are few
+    # forwards, as in the search: the unknowns are few
+    missed, jacobian = with_jacobian(lambda flat: ravel_pytree(fn(unravel(flat), args)[0])[0])(flat)
     pull = missed @ jacobian
     if isinstance(solver, BoundedLevenbergMarquardt):
         lower, upper, *_ = rules_of(solver, jnp, optimum)
@@ -258,7 +255,7 @@ def _linearised(
     if conditions is None:
         none = jnp.zeros((0, flat.size), flat.dtype)
         return Linearisation(rows, none[:, 0], none, missed.size), aux
-    slopes, margins = jax.jacfwd(lambda flat: (conditions(unravel(flat)),) * 2, has_aux=True)(flat)
+    margins, slopes = with_jacobian(lambda flat: conditions(unravel(flat)))(flat)
     return Linearisation(rows, margins, slopes, missed.size), aux
 
 

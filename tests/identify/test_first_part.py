@@ -5,7 +5,7 @@ import pytest
 
 from jaxdamp.bench import BenchRun, SineTest, VirtualDyno
 from jaxdamp.dampers import Besinger
-from jaxdamp.identify import first_part, fit, prepare, several
+from jaxdamp.identify import fit, prepare, several
 from jaxdamp.identify.search import Searches
 
 
@@ -27,7 +27,7 @@ def growing(run):
 
 def test_the_first_part_has_the_whole_motion_in_fewer_samples(runs):
     problem = prepare(NEAR, runs, rig="offset")
-    part, values = first_part.first_part(problem), problem.free.values
+    part, values = several.first_part(problem), problem.free.values
     assert part is not None
     whole, seen = np.asarray(problem.residual(values)), np.asarray(part.residual(values))
     for place, run in zip(problem.places, problem.runs, strict=True):
@@ -41,9 +41,9 @@ def test_the_first_part_has_the_whole_motion_in_fewer_samples(runs):
 
 def test_there_is_none_of_short_records_and_of_a_motion_that_grows(runs):
     short = VirtualDyno(LAW).run(SineTest(0.02, 5.0))
-    assert first_part.first_part(prepare(NEAR, runs)) is not None
-    assert first_part.first_part(prepare(NEAR, short)) is None
-    assert first_part.first_part(prepare(NEAR, [growing(run) for run in (*runs, *runs)])) is None
+    assert several.first_part(prepare(NEAR, runs)) is not None
+    assert several.first_part(prepare(NEAR, short)) is None
+    assert several.first_part(prepare(NEAR, [growing(run) for run in (*runs, *runs)])) is None
 
 
 @pytest.fixture
@@ -63,7 +63,7 @@ def counted(monkeypatch):
 def test_starts_are_compared_on_fewer_samples_with_the_same_answer(runs, counted, monkeypatch):
     result, looks = fit(NEAR, runs, rig="offset"), counted.copy()
     counted.clear()
-    monkeypatch.setattr(first_part, "LEAST", np.inf)
+    monkeypatch.setattr(several, "LEAST", np.inf)
     on_all = fit(NEAR, runs, rig="offset")
     assert result.converged and result.starts == on_all.starts > 3
     for one, other in zip(result.parameters, on_all.parameters, strict=True):

@@ -10,7 +10,7 @@ from jaxdamp.bench import BenchRun, SineTest, VirtualDyno, initial_temperature, 
 from jaxdamp.dampers import AbstractDamper, Bilinear, CoulombFriction, Heated, Linear, TemperatureScaled
 from jaxdamp.identify import compare, cross_validate, fit
 from jaxdamp.identify.held_out import on_records
-from jaxdamp.identify.start_temperatures import first_samples
+from jaxdamp.identify.record_starts import first_samples
 from jaxdamp.parameters import get, replace
 from jaxdamp.rig import Rig
 

@@ -12,7 +12,7 @@ from jaxdamp.identify import compare, cross_validate
 from jaxdamp.identify.held_out import motions
 from jaxdamp.identify.model import is_memoryless
 from jaxdamp.identify.predicting import used_samples
-from jaxdamp.identify.recommending import recommendation
+from jaxdamp.identify.rungs import recommendation
 
 
 TRUTH = Bilinear(2600.0, 1200.0)

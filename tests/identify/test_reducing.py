@@ -24,8 +24,8 @@ from jaxdamp.dampers import (
 )
 from jaxdamp.export import from_json, to_json
 from jaxdamp.identify import compare
-from jaxdamp.identify.recommending import recommendation
 from jaxdamp.identify.reducing import held_of, reduced, simpler_laws, without_zero_terms
+from jaxdamp.identify.rungs import recommendation
 from jaxdamp.parameters import parameters
 from jaxdamp.rig import quasi_static
 from tests.dampers.test_contract import LAWS

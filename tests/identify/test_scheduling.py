@@ -10,8 +10,7 @@ import pytest
 from jaxdamp import identify
 from jaxdamp.bench import SineTest, VirtualDyno
 from jaxdamp.dampers import Bilinear, Lag, Linear, ModifiedBoucWen, Scaled, Scheduled, Spring, with_command
-from jaxdamp.identify.recommending import not_worse
-from jaxdamp.identify.rungs import cannot_choose
+from jaxdamp.identify.rungs import cannot_choose, not_worse
 from jaxdamp.parameters import get
 from jaxdamp.rig import Rig
 

@@ -151,7 +151,7 @@ def test_the_learnt_rung_is_trained_without_the_record_it_stops_by(lagged, monke
 
 def test_a_copy_of_a_record_is_not_what_a_learnt_start_stops_by(lagged, monkeypatch):
     calls = []
-    monkeypatch.setattr("jaxdamp.identify.ladder.train", lambda law, runs, **how: calls.append((runs, how)))
+    monkeypatch.setattr("jaxdamp.identify.training.train", lambda law, runs, **how: calls.append((runs, how)))
     copies = [dataclasses.replace(run, name=f"{run.name} again") for run in lagged[:2]]
     identify.LearntStart(keys=1).trainings([*lagged, *copies])
     ((rest, how),) = calls

@@ -8,7 +8,7 @@ import pytest
 
 from jaxdamp import identify, roads
 from jaxdamp.dampers import CoulombFriction, Dahl, Linear
-from jaxdamp.identify.recommending import recommendation
+from jaxdamp.identify.rungs import recommendation
 from jaxdamp.identify.vehicle_comparing import _smallest, on_drives
 from jaxdamp.parameters import get, replace
 from jaxdamp.vehicles import Guide, Guided, HalfCar, QuarterCar
