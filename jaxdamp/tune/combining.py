@@ -15,6 +15,7 @@ from jaxdamp.tune.descending import Ended, missed
 from jaxdamp.tune.limits import Limit
 from jaxdamp.tune.measuring import LANES
 from jaxdamp.tune.ranges import MOST_COMBINATIONS
+from jaxdamp.tune.scenario_ride import smooth_in_scenarios
 from jaxdamp.tune.task import DesignTask, Evaluator
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -47,7 +48,7 @@ class Driven:
         task, ranks = self.task, [rank(self.task, one, limits) for one in self.ends]
         order = sorted(range(len(ranks)), key=lambda i: ranks[i])
         ends = [self.ends[i] for i in order]
-        each = [task.numbers(one.evaluation.values) for one in ends]
+        each = [printed_numbers(task, one) for one in ends]
         names = dict.fromkeys([task.objective.name, *task.allowed])
         owners = zip(task.space.free.names, task.space.free.owners, strict=True)
         return Combinations(
@@ -82,9 +83,18 @@ def _is_allowed(task: DesignTask[AbstractVehicle], point: Sequence[float]) -> bo
     return True
 
 
+def printed_numbers(task: DesignTask[AbstractVehicle], ended: Ended) -> dict[str, float]:
+    """The numbers at the end of a search: of scenarios by the true risk, where the search has a smooth one."""
+    numbers = task.numbers(ended.evaluation.values)
+    if not smooth_in_scenarios(task.measured.ride):
+        return numbers
+    vehicle = task.space.free.build(jnp.asarray(ended.values, task.space.free.values.dtype))
+    return numbers | task.measured.reported(task.measured.each(vehicle))
+
+
 def rank(task: DesignTask[AbstractVehicle], ended: Ended, limits: Sequence[Limit]) -> tuple[float, float]:
     """By how much limits are violated at the end of a search, and the metric there; infinite if it has none."""
-    numbers = task.numbers(ended.evaluation.values)
+    numbers = printed_numbers(task, ended)
     beyond = [max(-limit.margin(numbers[limit.name]), 0.0) for limit in missed(limits, numbers, task.tolerance)]
     pair = float(sum(beyond)), numbers[task.objective.name]
     return (math.inf, math.inf) if any(map(math.isnan, pair)) else pair

@@ -16,7 +16,7 @@ from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, MetricValues
 from jaxdamp.solve import Evaluation
 from jaxdamp.tune.combinations import Combinations, beside_next
-from jaxdamp.tune.combining import Driven, every_combination, rank
+from jaxdamp.tune.combining import Driven, every_combination, printed_numbers, rank
 from jaxdamp.tune.descending import Descent, Ended, missed, reached
 from jaxdamp.tune.limits import Limit, LimitEnd, LimitRange, decided, end_moved, in_each, limit_ends, lost_limits
 from jaxdamp.tune.measuring import ride_on
@@ -176,7 +176,7 @@ def _attempts(
 ) -> tuple[Attempt, ...]:
     """The searches from several starts, given by their coordinates."""
     pairs = zip(starts * task.space.unit, several, strict=True)
-    numbers = [task.numbers(one.evaluation.values) for one in several]
+    numbers = [printed_numbers(task, one) for one in several]
     return tuple(
         Attempt(
             start,

@@ -39,7 +39,7 @@ class OutOfReach(NamedTuple):
     @property
     def sentence(self) -> str:
         """Where, by how much and why."""
-        why = "no bound prevents it: a damper of this kind has no such force"
+        why = "no bound of these numbers prevents it: what is held, such as the geometry, would have to change"
         if self.binding:
             whose = "its bound" if len(self.binding) == 1 else "their bounds"
             why = f"{' and '.join(self.binding)} would have to pass {whose}"

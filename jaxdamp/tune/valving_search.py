@@ -218,6 +218,8 @@ def _wanted(
     """The target as points and loops."""
     if isinstance(target, AbstractDamper):
         points = np.asarray(VELOCITIES if velocities is None else velocities, float)
+        if not (points.size or motions):
+            _checks.refuse("velocities", "hold one or more without `motions`", points)
         curve = np.asarray(quasi_static(target, points).force, float)
         if not np.all(np.isfinite(curve)):
             _checks.refuse("target", "have a force at every velocity", curve, "Choose others by `velocities`.")
@@ -238,8 +240,8 @@ def _wanted(
 def _points(target: tuple[object, ...]) -> Wanted:
     """Velocities and forces as a target."""
     shapes = [np.asarray(values).shape for values in target]
-    if len(shapes) != 2 or len(shapes[0]) != 1 or shapes[0] != shapes[1]:
-        _checks.refuse("target", "be velocities and as many forces", _checks.described(target))
+    if len(shapes) != 2 or len(shapes[0]) != 1 or shapes[0] != shapes[1] or shapes[0] == (0,):
+        _checks.refuse("target", "be velocities, one or more, and as many forces", _checks.described(target))
     points, curve = (np.asarray(values, float) for values in target)
     _checks.finite("target", np.concatenate([points, curve]))
     return Wanted(points, curve, ())
@@ -251,7 +253,8 @@ def _loop(target: AbstractDamper, start: MonoTube | TwinTube, frequency: float, 
     steps = max(CYCLE, int(np.ceil(1.0 / (frequency * LONGEST_STEP))))
     dt = 1.0 / (frequency * steps)
     angle = 2.0 * np.pi * np.arange(2 * steps + 1) / steps
-    stroke, velocity = amplitude * np.sin(angle), 2.0 * np.pi * frequency * amplitude * np.cos(angle)
+    ahead = np.round(np.cos(angle), 15)  # zero where the motion turns, so that no rounding error is a velocity
+    stroke, velocity = amplitude * np.sin(angle), 2.0 * np.pi * frequency * amplitude * ahead
     time = dt * np.arange(len(angle))
     respond(start, time, stroke, velocity, state=start.state_at_rest(stroke[0]))  # refuses strokes beyond its chambers
     wanted = respond(target, time, stroke, velocity, state=target.state_at_rest(stroke[0]))

@@ -109,6 +109,7 @@ def test_targets_become_points_and_loops():
     assert wanted.force.tolist() == [-1000.0, 1000.0]
     (loop,) = wanted.loops
     assert len(loop.force) - loop.first == 501 and loop.force[loop.first] == pytest.approx(2000 * 0.08 * np.pi)
+    assert np.count_nonzero(loop.velocity == 0.0) == 4  # where two cycles turn
     time = np.arange(1000) / 1e3
     stroke = 0.01 * np.sin(6 * np.pi * time)
     run = bench.BenchRun.from_arrays("3 Hz", time, stroke, 300 * np.cos(6 * np.pi * time))
@@ -136,7 +137,9 @@ def test_the_noisy_hysteresis_of_a_known_damper_is_reached():
 @pytest.mark.parametrize(
     ("target", "options", "message"),
     [
-        ((CURVE, CURVE[:-1]), {}, "target.*velocities and as many forces"),
+        ((CURVE, CURVE[:-1]), {}, "target.*velocities, one or more, and as many forces"),
+        ((CURVE[:0], CURVE[:0]), {}, "target.*velocities, one or more"),
+        (dampers.Linear(1.0), {"velocities": []}, "velocities.*one or more"),
         ((CURVE, 0.0 * CURVE), {}, "target.*have a force"),
         ((CURVE, CURVE), {"motions": [(1.0, 0.01)]}, "motions.*unless the target is a law"),
         (dampers.Linear(1.0), {"motions": [(1.0, 0.5)]}, "stroke.*MonoTube"),
