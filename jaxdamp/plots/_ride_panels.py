@@ -128,7 +128,7 @@ def road(axes: Axes, shown: _rides.Rides) -> None:
         axes.loglog(n, roughness * (n / 0.1) ** -2.0, **_style.AFTER)
         name = road_class(roughness)
     else:
-        spacing = speed * float(shown.responses[0].time[1] - shown.responses[0].time[0])
+        spacing = speed * shown.responses[0].dt
         measured = assess_roughness(heights, spacing, bands_per_octave=3)
         axes.loglog(measured.spatial_frequency, measured.displacement_psd, **_style.AFTER)
         name = measured.road_class

@@ -73,7 +73,7 @@ def _driven(response: Response, values: np.ndarray) -> tuple[np.ndarray, np.ndar
     from scipy.signal import csd
 
     axles = np.array(response.vehicle.frame().axles)
-    rate, dt = np.asarray(response.road_rate)[:, axles == 0].mean(axis=1), _step(response)
+    rate, dt = np.asarray(response.road_rate)[:, axles == 0].mean(axis=1), response.dt
     size = min(round(_SEGMENT / dt), len(values))
     frequency, excited = welch(rate, dt, size)
     gain = np.full(excited.size, np.nan, complex)  # where the road has no power
@@ -92,11 +92,6 @@ def smoothed(frequency: np.ndarray, density: np.ndarray) -> tuple[np.ndarray, np
     return np.array([np.exp(np.mean(np.log(frequency[band == b]))) for b in bands]), np.array(
         [density[band == b].mean() for b in bands]
     )
-
-
-def _step(response: Response) -> float:
-    time = response.time
-    return float(time[-1] - time[0]) / (len(time) - 1)
 
 
 def _bands(axes: Axes, frequencies: np.ndarray) -> None:
@@ -138,7 +133,7 @@ def _densities(shown: _rides.Rides, channel: str) -> list[tuple[np.ndarray, np.n
     if shown.responses is None:
         pair = {} if shown.tuning is None else shown.tuning.spectra([channel])
         return [(one.frequency, one.density) for one in pair[channel]] if pair else None
-    return [whole_spectrum(np.asarray(response[channel]), _step(response)) for response in shown.responses]
+    return [whole_spectrum(np.asarray(response[channel]), response.dt) for response in shown.responses]
 
 
 def event(axes: Axes, shown: _rides.Rides) -> None:

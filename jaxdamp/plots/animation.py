@@ -53,11 +53,11 @@ def animation(responses: Response | Mapping[str, Response], path: str | os.PathL
     if length > LONGEST:
         begin, cut = float(first.time[0]), f" The first {LONGEST:g} of {length:g} s."
         runs = {name: run.between(begin, begin + LONGEST) for name, run in runs.items()}
-    every = max(round(1.0 / (RATE * float(first.time[1] - first.time[0]))), 1)
+    every = max(round(1.0 / (RATE * first.dt)), 1)
     designs: list[Contents] = [{"name": name} | _design(run, every) for name, run in runs.items()]
     data = {
         "title": title or f"{_style.first_upper(_style.class_words(first.vehicle))} on its road",
-        "step": every * float(first.time[1] - first.time[0]),
+        "step": every * first.dt,
         "cut": cut,
         "designs": designs,
     }

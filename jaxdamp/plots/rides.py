@@ -80,13 +80,12 @@ def ride(
             axes.plot(time[seen], _factor(first, channel) * np.asarray(all_channels[channel])[seen], **style)
         values = np.asarray(all_channels[channels[0]])
         label = f"{_style.in_words(name) + ': ' if name else ''}RMS {_style.short(np.sqrt(np.mean(values**2)))} {unit}"
-        frequency, density = _spectrum(values, time, frequencies)
+        frequency, density = _spectrum(values, response.dt, frequencies)
         if weighting is not None:
-            dt = float(time[1] - time[0])
             felt_rms = metrics.Metric(channels[0], "rms", weighting)
             weighted = response.metrics([felt_rms])[felt_rms.name]
             label += f", weighted by {weighting} {_style.short(float(weighted))} {unit}"
-            felt.append(("_", style, whole_spectrum(values, dt)))
+            felt.append(("_", style, whole_spectrum(values, response.dt)))
         handles += spectrum.loglog(frequency, density, label=label, **style)
     for axes, channel in zip(rows, channels, strict=True):
         fitted_range.shade_channel(axes, responses.values(), channel)
@@ -144,10 +143,9 @@ def _window(response: Response, channel: str) -> tuple[float, float]:
 
 
 def _spectrum(
-    values: Float[np.ndarray, " time"], time: Float[np.ndarray, " time"], band: tuple[float | int, float | int]
+    values: Float[np.ndarray, " time"], dt: float, band: tuple[float | int, float | int]
 ) -> tuple[Float[np.ndarray, " lines"], Float[np.ndarray, " lines"]]:
     """Welch's estimate with segments longer than a period of the lowest frequency, where the run is."""
-    dt = float(time[-1] - time[0]) / (len(time) - 1)
     size = min(max(len(values) // 8, round(1.2 / (band[0] * dt))), len(values))
     frequency, density = welch(values, dt, size)
     inside = (frequency > 0) & (frequency >= band[0]) & (frequency <= band[1])

@@ -53,17 +53,24 @@ def same_columns(argument: str, roads: Sequence[AbstractRoad]) -> None:
     """Refuse roads whose columns do not stand for the same wheels."""
     first, *others = (road.columns for road in roads)
     for other in others:
-        if (other.kind, other.tracks, _axles(other)) != (first.kind, first.tracks, _axles(first)):
+        if not _alike(first, other):
             remedy = "Put single tracks together first, and use `two_track`, `delayed` or `in_phase` on the result."
             _checks.refuse(argument, f"have columns alike: {_said(first)}", _said(other), remedy)
 
 
-def _axles(columns: Columns) -> int:
-    return 1 if columns.delays is None else columns.delays.size
+def _alike(one: Columns, other: Columns) -> bool:
+    """Whether columns stand for the same wheels, their axles equally far apart as far as these are known."""
+    if one[:2] != other[:2] or one.delays is None or other.delays is None:
+        return one[:2] == other[:2]
+    apart = [np.diff(known) for delays in (one.delays, other.delays) if (known := _checks.concrete(delays)) is not None]
+    return one.delays.size == other.delays.size and all(np.allclose(a, apart[0], atol=1e-5) for a in apart)
 
 
 def _said(columns: Columns) -> str:
-    return f"{columns}, in phase" if columns.kind == "in phase" else str(columns)
+    if columns.kind == "in phase":
+        return f"{columns}, in phase"
+    delays = None if columns.delays is None else _checks.concrete(columns.delays)
+    return str(columns) if delays is None else f"{columns}, {', '.join(f'{delay:.4g}' for delay in delays)} s late"
 
 
 @final
@@ -87,7 +94,8 @@ def superposed(*roads: AbstractRoad) -> Superposed:
         roads: at least one road, all with the same number of tracks.
 
     Raises:
-        ValueError: if there is no road, or if their numbers of tracks differ or stand for different wheels.
+        ValueError: if there is no road, or if their tracks differ in number, stand for different wheels, or reach the
+            axles after other delays.
 
     >>> import jax.numpy as jnp
     >>> from jaxdamp.roads import cosine_bump, sine
@@ -158,8 +166,8 @@ def joined(first: AbstractRoad, second: AbstractRoad, *, at: ScalarLike | int | 
         at: t1 [s]; by default the time at which the first road ends or repeats.
 
     Raises:
-        ValueError: if the roads have different numbers of tracks or tracks of different wheels, if `at` is negative or
-            beyond the end of the first road, or if it is left out where the first road has no end.
+        ValueError: if the roads are delayed, have different numbers of tracks or tracks of different wheels, if `at` is
+            negative or beyond the end of the first road, or if it is left out where the first road has no end.
 
     >>> import jax.numpy as jnp
     >>> from jaxdamp.roads import from_profile, step
@@ -174,6 +182,9 @@ def joined(first: AbstractRoad, second: AbstractRoad, *, at: ScalarLike | int | 
         remedy = "Join single tracks first and use `two_track` and `delayed` on the result."
         _checks.refuse("second", f"have {first.wheels} tracks, as `first` has", second.wheels, remedy)
     same_columns("second", (first, second))
+    if first.columns.kind == "delayed":
+        remedy = "Put single tracks together first, and use `delayed` on the result."
+        _checks.refuse("first", "not be delayed: its axles would reach `second` at one instant", first.columns, remedy)
     if at is None:
         at = first.duration
     if at is None:

@@ -31,7 +31,7 @@ def _road_rates(response: "Response") -> tuple[Array, Callable[[Array], Array], 
     """
     if response.every > 1:
         return response.road_rate, _same, _middle
-    return jnp.diff(response.road, axis=0) / jnp.diff(response.time)[:, None], _middle, _same
+    return jnp.diff(response.road, axis=0) / response.dt, _middle, _same
 
 
 @compiled_for_loops
@@ -48,7 +48,7 @@ def energy_balance(response: "Response") -> dict[str, Scalar]:
         response: the run, or a part of it.
     """
     form, n = response.system.form, len(response.system.layout.coordinates)
-    q, rate, road, dt = response.motion[:, :n], response.motion[:, n:], response.road, jnp.diff(response.time)
+    q, rate, road, dt = response.motion[:, :n], response.motion[:, n:], response.road, response.dt
     slope, there, mean = _road_rates(response)
 
     def stored(i: int) -> Scalar:
@@ -61,9 +61,9 @@ def energy_balance(response: "Response") -> dict[str, Scalar]:
         push = push - response.port_force @ form.port_road
     towed = there(rate) @ form.road_damping
     rolled = slope @ form.ground_damping
-    road_work = jnp.sum(mean((there(push) + rolled - towed) * slope) * dt[:, None])
+    road_work = jnp.sum(mean((there(push) + rolled - towed) * slope)) * dt
     dashpots = _middle(jnp.sum((rate @ form.damping) * rate, axis=1))
-    dashed = jnp.sum((dashpots + jnp.sum(mean((rolled - 2.0 * towed) * slope), axis=1)) * dt)
+    dashed = jnp.sum(dashpots + jnp.sum(mean((rolled - 2.0 * towed) * slope), axis=1)) * dt
     absorbed = sum(absorbed_by(response).values(), jnp.zeros(()))
     change = stored(-1) - stored(0)
     parts = {"road_work": road_work, "stored": change, "absorbed": absorbed, "dashpots": dashed}
@@ -80,10 +80,9 @@ def absorbed_by(response: "Response") -> dict[str, Scalar]:
         response: the run, or a part of it.
     """
     form, n = response.system.form, len(response.system.layout.coordinates)
-    dt = jnp.diff(response.time)
     moved = _middle(response.port_force * (response.motion[:, n:] @ form.ports.T))
     if form.port_road is not None:
         slope, there, mean = _road_rates(response)
         moved = moved - mean(there(response.port_force) * (slope @ form.port_road.T))
-    taken = jnp.sum(moved * dt[:, None], axis=0)
+    taken = jnp.sum(moved, axis=0) * response.dt
     return dict(zip(response.system.layout.ports, taken, strict=True))

@@ -7,7 +7,7 @@ from typing import NamedTuple, final
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Array, Float, PyTree
+from jaxtyping import Array, ArrayLike, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._jacobian import Mode
@@ -40,6 +40,10 @@ class AbstractObserver(ABC):
         """What is saved of an instant."""
 
 
+# heights [m] and rates [m/s] of the road, and commands, at the first instant of a run
+FirstRows = tuple[Float[ArrayLike, " wheels"], Float[ArrayLike, " wheels"], Float[ArrayLike, " commands"] | None]
+
+
 @final
 class RunState(eqx.Module):
     """Where a run stopped, and from where another one goes on: `simulate(..., state=...)`.
@@ -49,12 +53,14 @@ class RunState(eqx.Module):
     Attributes:
         time: instant at which the run stopped [s].
         now: motion (q, q̇), states and forces of the elements there, and what the engine remembers of earlier steps.
+        first: heights [m] and rates [m/s] of the road and commands with which it began, from which displacements count.
         step: last step of the engine [s].
         engine: name of its class, which alone knows what it remembers.
     """
 
     time: Scalar
     now: StepState
+    first: FirstRows
     step: float = eqx.field(static=True)
     engine: str = eqx.field(static=True)
 

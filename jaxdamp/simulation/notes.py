@@ -156,13 +156,14 @@ NEAR = 0.05  # of the range of the levels: nearer to an end, the limits of a com
 
 
 def commands_at_limits(
-    system: System, time: Float[np.ndarray, " time"], commands: Float[np.ndarray, "time commands"]
+    system: System, dt: float, every: int, commands: Float[np.ndarray, "time commands"]
 ) -> tuple[str, ...]:
     """Dampers whose commands stood at one end of their levels most of the time, or changed as fast as they can.
 
     Arguments:
         system: the vehicle with its controller.
-        time: of the instants [s].
+        dt: spacing of the instants [s].
+        every: of how many instants of the run one is saved.
         commands: of the dampers, then the demanded forces [N].
     """
     control: ControlLoop = system.control
@@ -179,14 +180,14 @@ def commands_at_limits(
                     f"The command of the {name} stood at its {word} level, {level:g}, {100.0 * share:.0f} % of the "
                     f"time: the damper can be {at_most} than it is there."
                 )
-        if control.rate_limit is not None and time.size > 1:
-            rate = np.diff(command) / (time[1] - time[0])
+        if control.rate_limit is not None and len(command) > 1:
+            rate = np.diff(command) / dt
             rising, falling = float(control.rate_limit.rising), float(control.rate_limit.falling)
             share = float(np.mean((rate > 0.999 * rising) | (rate < -0.999 * falling)))
             if share > OFTEN:
                 texts.append(
                     f"The command of the {name} changed as fast as its actuator can, {rising:g} up and {falling:g} "
-                    f"down per second, {100.0 * share:.0f} % of the time."
+                    f"down per second, {'at least ' * (every > 1)}{100.0 * share:.0f} % of the time."
                 )
     return tuple(texts)
 

@@ -21,6 +21,7 @@ from jaxdamp._types import Dataset, Figure, Scalar, Signal
 from jaxdamp.dampers import RangeUse
 from jaxdamp.metrics import Metric
 from jaxdamp.simulation.energy import absorbed_by, energy_balance
+from jaxdamp.simulation.engine import FirstRows
 from jaxdamp.simulation.notes import (
     Delivery,
     commands_at_limits,
@@ -89,10 +90,12 @@ class Response(eqx.Module, AbstractResult):
         road, road_rate: heights under the wheels [m, up] and their rates [m/s], shape (time, wheels).
         final_state: states of each element at the end.
         axle_timing: when each axle met the road.
+        dt: spacing of the instants [s].
+        every: of how many instants of the run one is saved.
+        commands: of the dampers, then the demanded forces [N], shape (time, commands); None without a controller.
+        first: heights and rates of the road and commands where the run began that this one goes on with; else None.
         whole: the run that this response is a part of; None for a run.
         begin: number of the first instant of this part in the run.
-        commands: of the dampers, then the demanded forces [N], shape (time, commands); None without a controller.
-        every: of how many instants of the run one is saved.
     """
 
     vehicle: AbstractVehicle
@@ -104,10 +107,12 @@ class Response(eqx.Module, AbstractResult):
     road_rate: Float[Array, "time wheels"]
     final_state: list[Float[Array, " _state"]]
     axle_timing: AxleTiming
+    dt: float = eqx.field(static=True, repr=False)
+    every: int = eqx.field(static=True, repr=False)
+    commands: Float[Array, "time commands"] | None
+    first: FirstRows | None
     whole: "Response | None" = None
     begin: Int[Array, ""] | None = None
-    commands: Float[Array, "time commands"] | None = None
-    every: int = eqx.field(static=True, repr=False, default=1)
     histogram = Elsewhere("`jaxdamp.metrics.velocity_histogram(response['damper_velocity'], edges)`")
     _computed: _Remembered = eqx.field(init=False, repr=False, default_factory=_Remembered)
 
@@ -141,7 +146,7 @@ class Response(eqx.Module, AbstractResult):
         tyres = tyres_in_tension(self.system, np.asarray(self.time), self.__getitem__)
         limits = ()
         if self.commands is not None:
-            limits = commands_at_limits(self.system, np.asarray(self.time), np.asarray(self.commands))
+            limits = commands_at_limits(self.system, self.dt, self.every, np.asarray(self.commands))
         still = without_motion(np.asarray(self.motion), np.asarray(self.road))
         return (*still, *tyres, *range_sentences(self.range_use()), *limits)
 
@@ -218,7 +223,7 @@ class Response(eqx.Module, AbstractResult):
         if time is None:
             remedy = "Inside compiled code, cut the channels by the numbers of their instants."
             _checks.refuse("between", "be asked of a run whose times are known", "traced", remedy)
-        slack = 0.01 * float(time[1] - time[0])
+        slack = 0.01 * self.dt + float(np.finfo(time.dtype).eps * time[-1])  # to which instants are rounded
         inside = np.flatnonzero((time >= start - slack) & (time <= stop + slack))
         if start < time[0] - slack or stop > time[-1] + slack or inside.size < 2:
             must = f"be two instants or more of the run, {time[0]:g} to {time[-1]:g} s"

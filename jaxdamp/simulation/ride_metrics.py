@@ -14,6 +14,7 @@ from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Scalar, ScalarLike, Signal
 from jaxdamp._vectors import scalars
 from jaxdamp.metrics import Metric, MetricValues, Statistic
+from jaxdamp.simulation.engine import FirstRows
 from jaxdamp.simulation.equations import Equations, RoadInput, settled
 from jaxdamp.vehicles import System
 
@@ -44,7 +45,7 @@ def ride_metrics(response: "Response", names: Sequence[str | Metric] | None = No
     Raises:
         ValueError: a name that is no ride metric, or a window in a run whose times JAX traces.
     """
-    chosen, dt = response.vehicle.chosen_metrics(names, "names"), _step(response)
+    chosen, dt = response.vehicle.chosen_metrics(names, "names"), response.dt
 
     def made() -> dict[str, Scalar]:
         signals = {metric.name: _signals(response, metric, dt) for metric in chosen}
@@ -64,7 +65,7 @@ def comfort(response: "Response") -> dict[str, Comfort]:
     Arguments:
         response: the run, or a part of it.
     """
-    layout, dt = response.system.layout, _step(response)
+    layout, dt = response.system.layout, response.dt
     names = dict.fromkeys(m.channel for m in layout.metrics if layout.by_name[m.channel].kind.weighting)
 
     def of(name: str) -> Comfort:
@@ -74,14 +75,7 @@ def comfort(response: "Response") -> dict[str, Comfort]:
     return {name: of(name) for name in names}
 
 
-def _step(response: "Response") -> ScalarLike:
-    """Spacing of the instants [s], as a plain number where it is known: then filters are made by NumPy."""
-    time = response.run.time
-    numbers = _checks.concrete(time)
-    return time[1] - time[0] if numbers is None else float(numbers[1] - numbers[0])
-
-
-def _samples(response: "Response", metric: Metric, dt: ScalarLike) -> tuple[int, int]:
+def _samples(response: "Response", metric: Metric, dt: float) -> tuple[int, int]:
     """Numbers of the first and the last instant that count."""
     time = _checks.concrete(response.time)
     if metric.window is None:
@@ -89,7 +83,7 @@ def _samples(response: "Response", metric: Metric, dt: ScalarLike) -> tuple[int,
     if time is None:
         remedy = "Inside compiled code, take the metric from a `Ride`, or cut the channel."
         _checks.refuse(f"window of {metric.name!r}", "be asked of a run whose times are known", "traced", remedy)
-    return metric.samples(time.size, float(dt), float(time[0]))
+    return metric.samples(time.size, dt, float(time[0]))
 
 
 class _Signals(NamedTuple):
@@ -100,7 +94,7 @@ class _Signals(NamedTuple):
     by: Signal | None
 
 
-def _signals(response: "Response", metric: Metric, dt: ScalarLike) -> _Signals:
+def _signals(response: "Response", metric: Metric, dt: float) -> _Signals:
     channel, weighting = metric.channel, metric.weighting
     signal = response[channel] if weighting is None else _weighted(response, channel, weighting, dt)
     rest = _at_rest(response.run)[response.system.layout.numbers[channel]] if metric.from_rest else None
@@ -130,7 +124,7 @@ def _comfort(weighted: Signal, dt: ScalarLike) -> Comfort:
     return Comfort(metrics.rms(weighted), transient, metrics.vibration_dose_value(weighted, dt, None))
 
 
-def _weighted(response: "Response", channel: str, weighting: str, dt: ScalarLike) -> Signal:
+def _weighted(response: "Response", channel: str, weighting: str, dt: float) -> Signal:
     """An acceleration weighted by ISO 2631-1 from the start of the run."""
 
     def made() -> Signal:
@@ -145,16 +139,20 @@ def _weighted(response: "Response", channel: str, weighting: str, dt: ScalarLike
 _cut = jax.jit(jax.lax.dynamic_slice_in_dim, static_argnums=2)  # in one program
 
 
-def _at_rest(run: "Response") -> tuple[Scalar, ...]:
-    """The channels in the static equilibrium on the first heights of a run, as a `Ride` begins."""
+def first_rows(run: "Response") -> FirstRows:
+    """The heights and rates of the road and the commands with which a run began, or the one that it goes on with."""
 
     def first(rows: Float[Array, "time _"]) -> Float[ArrayLike, " _"]:
         known = _checks.concrete(rows)
-        return rows[0] if known is None else known[0]
+        return rows[0] if known is None else known[0].copy()
 
     commands = None if run.commands is None else first(run.commands)
-    begin = first(run.road), first(run.road_rate), commands
-    return run.remembered("at rest", lambda: _channels_at_rest(run.system, *begin))
+    return run.first or (first(run.road), first(run.road_rate), commands)
+
+
+def _at_rest(run: "Response") -> tuple[Scalar, ...]:
+    """The channels in the static equilibrium on the first heights of a run, as a `Ride` begins."""
+    return run.remembered("at rest", lambda: _channels_at_rest(run.system, *first_rows(run)))
 
 
 @compiled_quickly
@@ -172,10 +170,6 @@ def _channels_at_rest(
         acting = equations.at_commands(scalars(given[: given.size // 2]))
         force = jnp.concatenate([acting.at(now.motion, now.states, ground).force, given])
     return tuple(system.outputs(now.motion, force, *ground))
-
-
-if TYPE_CHECKING:
-    from jaxdamp.simulation.response import Response
 
 
 @of_known_numbers

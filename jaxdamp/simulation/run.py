@@ -24,6 +24,7 @@ from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.notes import range_sentences
 from jaxdamp.simulation.observer import recorded
 from jaxdamp.simulation.response import Response
+from jaxdamp.simulation.ride_metrics import first_rows
 from jaxdamp.simulation.settings import SIMULATION, SimulationSettings
 from jaxdamp.simulation.stability import known_system, rounded_down
 from jaxdamp.simulation.step_size import RunCheck
@@ -55,7 +56,8 @@ def simulate(
     With `state` a run goes on where an earlier one stopped (`return_state`): the motion, the states of the laws, what
     the engine remembers, and the place on the road. With fixed steps parts are the whole run to rounding; an `Adaptive`
     engine chooses its steps anew, and parts agree within its tolerances. The vehicle may differ in its numbers, such as
-    the command of a damper. Metrics of a part are those of the part alone, with weightings from rest.
+    the command of a damper. Metrics of a part are those of the part alone, with weightings from rest; displacements
+    count from the static equilibrium on the heights where the first part began.
 
     Arguments:
         vehicle: any vehicle, with its laws.
@@ -114,8 +116,8 @@ def simulate(
             refuse_restless(vehicle)
         remedy = " ".join([*filter(None, map(coverage, system.laws)), engine.remedy(status, dt)])
         _checks.refuse("vehicle", "have a finite response", f"at {last} (position, rate) at the end", remedy)
-    timing = axle_timing(vehicle, road)
-    response = Response(vehicle, system, time[::every], *saved[:5], timing, commands=saved.commands, every=every)
+    timing, first = axle_timing(vehicle, road), None if state is None else state.first
+    response = Response(vehicle, system, time[::every], *saved[:5], timing, every * dt, every, saved.commands, first)
     warn_outside(range_sentences(response.range_use()))
     if not return_state:
         return response
@@ -124,7 +126,7 @@ def simulate(
         _checks.refuse(
             "return_state", f"be left out beside a {type(engine).__name__}, which does not say", True, remedy
         )
-    return response, RunState(time[-1], saved.last, dt / engine.step_count, type(engine).__name__)
+    return response, RunState(time[-1], saved.last, first_rows(response), dt / engine.step_count, type(engine).__name__)
 
 
 def _check_state(state: RunState, start: Mapping[str, float] | None, engine: AbstractEngine, system: System) -> None:
@@ -265,8 +267,11 @@ def _displaced(
 ) -> Float[Array, " n"]:
     """The motion (q, q̇) at rest in the static equilibrium, with other values of some coordinates."""
     names = vehicle.coordinates
+    _checks.instance("start", start, Mapping, f'be coordinates by name, such as {{"{names[0]}": 0.1}}')
     for name, value in start.items():
         _checks.one_of("start", name, names)
         _checks.finite(f"start[{name!r}]", value)
+        if shape := np.shape(value):
+            _checks.refuse(f"start[{name!r}]", "be one number", f"of shape {shape}", "Use `jax.vmap` for many.")
     position = static_equilibrium(vehicle, road) | {name: jnp.asarray(v, dtype=float) for name, v in start.items()}
     return jnp.concatenate([jnp.stack([position[name] for name in names]), jnp.zeros(len(names))])

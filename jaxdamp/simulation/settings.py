@@ -35,8 +35,8 @@ class SimulationSettings(Run, total=False):
             instants. Under `jax.grad`, `jax.jvp` and `jax.vmap` they are those of the numbers that are differentiated,
             the most of a batch. Inside `jax.jit` the numbers of a vehicle that is an argument are not known: pass
             `substeps` (`simulation.substeps_needed`), or a `TracedStepWarning` says what is assumed.
-        every: save every so many-th instant only, of long runs. The motion is the same, but metrics and the energy
-            balance then know no more than what is saved; `Ride` gathers metrics at every instant and saves none.
+        every: save every so many-th instant only, of long runs. The motion is the same, but metrics, the energy balance
+            and notes then know no more than what is saved; `Ride` gathers metrics at every instant and saves none.
     """
 
     start: Mapping[str, float] | None

@@ -61,6 +61,9 @@ def test_commands_that_stay_at_a_limit_are_said():
         assert words in note and note.endswith(f"no {'harder' if 'lowest' in note else 'softer'} than it is there.")
     slow = simulate(Controlled(QUARTER, Skyhook(), rate_limit=RateLimit(3.0, 3.0)), ROAD, duration=1.0)
     assert len(slow.notes) == 1 and "changed as fast as its actuator can, 3 up and 3 down per second" in slow.notes[0]
+    slower = Controlled(QUARTER, Skyhook(), rate_limit=RateLimit(1.5, 1.5))
+    (note,) = simulate(slower, ROAD, duration=1.0, every=5).notes
+    assert note.endswith("at least 66 % of the time.")  # strides at the limit from end to end; of all instants it is 74
     assert not simulate(Controlled(QUARTER, Skyhook(), rate_limit=RateLimit(100.0, 100.0)), ROAD, duration=1.0).notes
 
 

@@ -48,6 +48,15 @@ def test_record_equals_the_closed_form_and_the_integrator():
     np.testing.assert_allclose(damper_temperature(power, 30.0, CAPACITY, COOLING, 20.0), solution.y[0], rtol=1e-6)
 
 
+@pytest.mark.parametrize("traced", [False, True])
+def test_single_precision_does_not_drift_over_a_long_record(traced):
+    """A time constant of 3 million samples, of which 1 - exp(-dt/tau) has two digits left."""
+    call = jax.jit(damper_temperature) if traced else damper_temperature
+    found = call(np.full(200_001, 90.0, np.float32), 1e-3, 3000.0, 1.0, 20.0)
+    expected = 90.0 * -np.expm1(-200.0 / 3000.0)
+    assert found.dtype == np.float32 and float(found[-1]) - 20.0 == pytest.approx(expected, rel=2e-6)
+
+
 def test_record_has_gradients():
     power = jnp.asarray(100.0 + 80.0 * np.sin(np.arange(60) / 5.0))
 

@@ -66,6 +66,10 @@ def test_gradient_in_the_place_of_the_joint(check_gradient):
             lambda: joined(RECORD, delayed(iso8608("C", 10.0, seed=0, length=100.0), delays=[0.0, 0.1])),
             r"`second` must have 1 tracks, as `first` has, but is 2.*`delayed` on the result",
         ),
+        (
+            lambda: joined(delayed(RECORD, delays=[0.0, 0.1]), delayed(RECORD, delays=[0.0, 0.1])),
+            r"`first` must not be delayed: its axles would reach `second` at one instant.*use `delayed` on the result",
+        ),
     ],
 )
 def test_errors(make, message):

@@ -2,7 +2,7 @@ import jax
 import numpy as np
 import pytest
 
-from jaxdamp.roads import cosine_bump, from_profile, iso8608, joined, sine, superposed, two_track
+from jaxdamp.roads import cosine_bump, delayed, from_profile, iso8608, joined, sine, superposed, two_track
 
 
 def test_heights_add_and_the_shortest_road_ends_it():
@@ -25,6 +25,13 @@ def test_a_closed_lap_repeats_until_the_longer_record_ends():
     assert superposed(lap, lap).duration == 5.0
     # a random road may not repeat, and ends it before
     assert superposed(lap, record, iso8608("C", 10.0, seed=1, length=100.0)).duration == 10.0
+
+
+def test_axles_must_be_as_far_apart():
+    one, late = (delayed(sine(0.01, frequency=1.0), delays=delays) for delays in ([0.0, 0.125], [0.3, 0.425]))
+    assert superposed(one, late).wheels == 2  # the rear axle follows the front alike
+    with pytest.raises(ValueError, match=r"columns alike: .* axles, 0, 0.125 s late, but is .* 0, 0.2 s late"):
+        superposed(one, delayed(sine(0.01, frequency=2.0), delays=[0.0, 0.2]))
 
 
 def test_tracks_must_be_equal():

@@ -259,6 +259,8 @@ def test_to_xarray_carries_units_and_time():
             {"road": roads.superposed(roads.cosine_bump(0.01, start=0.1023, duration=4e-4), roads.step(0.01))},
             r"`dt` must be at most half the time over the shortest bump, 0.0004 s.*is 0.005 s. Pass `dt=5e-05`",
         ),
+        ({"start": [0.1, 0.0]}, r"`start` must be coordinates by name, such as \{.z_sprung.: 0.1\}, but is a list"),
+        ({"start": {"z_sprung": np.array([0.1])}}, r"`start\['z_sprung'\]` must be one number, but is of shape \(1,\)"),
     ],
 )
 def test_refuses_runs_that_make_no_sense(change, message):
