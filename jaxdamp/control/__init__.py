@@ -8,7 +8,6 @@ your own (`AbstractVehiclePolicy`). `lqr` finds the gains of a linear feedback. 
 
 from jaxdamp.control.actuator import RateLimit
 from jaxdamp.control.controlled import Controlled
-from jaxdamp.control.filtered import BandSkyhook
 from jaxdamp.control.levels import laws_at_levels as laws_at_levels, outer_forces as outer_forces
 from jaxdamp.control.loop import (
     Commands as Commands,
@@ -22,6 +21,7 @@ from jaxdamp.control.optimal import lqr
 from jaxdamp.control.policies import (
     AbstractPolicy,
     AccelerationDriven,
+    BandSkyhook,
     Groundhook,
     HybridHook,
     ModalSkyhook,

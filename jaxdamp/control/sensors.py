@@ -3,7 +3,7 @@
 import dataclasses
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, TypeAlias, TypeVar, final
+from typing import ClassVar, NamedTuple, TypeAlias, TypeVar, final
 
 import equinox as eqx
 import jax
@@ -80,10 +80,7 @@ class AbstractFilter(AbstractDeclared):
     A run begins as if the vehicle had always stood still, so a constant error of the other signal has no effect.
     """
 
-    @property
-    @abstractmethod
-    def source(self) -> str:
-        """Name of the other signal."""
+    source: ClassVar[str]  # name of the other signal
 
     @abstractmethod
     def over(self, period: ScalarLike) -> Filter:
@@ -98,12 +95,8 @@ class Integrated(AbstractFilter):
     velocity comes early, at 1 Hz by 25° with a corner of 0.3 Hz.
     """
 
+    source = "body_acceleration"
     low: Number = parameter("Hz", "corner below which it does not integrate", positive, default=0.3, adjustable=False)
-
-    @property
-    def source(self) -> str:
-        """The acceleration of the body."""
-        return "body_acceleration"
 
     def over(self, period: ScalarLike) -> Filter:
         """The filter over a period: states are velocity and its rate."""
@@ -122,12 +115,8 @@ class Differentiated(AbstractFilter):
     Without a lag it is the difference of two readings over the period, and half a period late.
     """
 
+    source = "stroke"
     lag: Number = parameter("s", "time constant of its filter", nonnegative, default=0.01, adjustable=False)
-
-    @property
-    def source(self) -> str:
-        """The stroke."""
-        return "stroke"
 
     def over(self, period: ScalarLike) -> Filter:
         """The filter over a period."""

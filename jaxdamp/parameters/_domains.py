@@ -73,10 +73,6 @@ def _inverse_softplus(y: Numbers) -> Numbers:
         return xp.where(y > 30.0, y, xp.log(xp.expm1(xp.minimum(y, 30.0))))
 
 
-def _positive_to_raw(value: Numbers, scale: Numbers) -> Numbers:
-    return _inverse_softplus(jnp.maximum(value / scale, 1e-12))
-
-
 def _steps_up(value: Numbers) -> Numbers:
     xp = _library(value)
     return xp.diff(value, prepend=xp.zeros(1, value.dtype))
@@ -116,7 +112,7 @@ positive = Domain(
     "positive",
     lambda a: bool(np.all(a > 0)),
     lambda raw, scale: scale * jax.nn.softplus(raw),
-    _positive_to_raw,
+    lambda value, scale: _inverse_softplus(jnp.maximum(value / scale, 1e-12)),
     lower=0.0,
 )
 # Zero belongs to this domain, so the map is a square: it reaches zero at a finite raw value, unlike softplus. At
@@ -158,37 +154,6 @@ around_zero = dataclasses.replace(
 )
 
 
-def _bounded(
-    name: str,
-    lower: float,
-    upper: float,
-    share_of: Callable[[Array], Array],
-    raw_of: Callable[[Array], Array],
-    remade: Callable[[float, float], Domain],
-    steps: Callable[[Array], Array] | None = None,
-    slopes: Callable[[np.ndarray], np.ndarray] | None = None,
-) -> Domain:
-    """A domain between two finite numbers, from the map of raw numbers to shares of the range (0 to 1) and back."""
-    if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper):
-        raise ValueError(f"Bounds must be two finite numbers in increasing order, but are ({lower}, {upper}).")
-    width = upper - lower
-
-    def contains(a: np.ndarray) -> bool:
-        return bool(np.all((a >= lower) & (a <= upper))) and (steps is None or bool(np.all(np.diff(a) > 0)))
-
-    return Domain(
-        f"{name}between {lower:g} and {upper:g}",
-        contains,
-        lambda raw, scale: lower + width * share_of(raw),
-        lambda value, scale: raw_of((value - lower) / width),
-        lower,
-        upper,
-        steps,
-        None if slopes is None else lambda raw, scale: width * slopes(raw),
-        (remade, (lower, upper)),
-    )
-
-
 def _logit(share: Array) -> Array:
     share = jnp.clip(share, 1e-9, 1 - 1e-9)
     return jnp.log(share / (1 - share))
@@ -225,13 +190,7 @@ def interval(lower: float, upper: float) -> Domain:
         lower: lower end, in the unit of the parameter.
         upper: upper end.
     """
-    return _interval(_checks.plain_number("lower", lower), _checks.plain_number("upper", upper))
-
-
-@functools.cache
-def _interval(lower: float, upper: float) -> Domain:
-    """The same domain for the same ends: what holds it compiles once."""
-    return _bounded("", lower, upper, jax.nn.sigmoid, _logit, interval)
+    return _between(_checks.plain_number("lower", lower), _checks.plain_number("upper", upper), ordered=False)
 
 
 def ordered_interval(lower: float, upper: float) -> Domain:
@@ -241,10 +200,28 @@ def ordered_interval(lower: float, upper: float) -> Domain:
         lower: lower end, in the unit of the parameter.
         upper: upper end.
     """
-    return _ordered_interval(_checks.plain_number("lower", lower), _checks.plain_number("upper", upper))
+    return _between(_checks.plain_number("lower", lower), _checks.plain_number("upper", upper), ordered=True)
 
 
-@functools.cache
-def _ordered_interval(lower: float, upper: float) -> Domain:
-    maps = _ordered_shares, _raw_of_ordered_shares, ordered_interval
-    return _bounded("strictly increasing ", lower, upper, *maps, increasing.steps, _slopes_of_ordered_shares)
+@functools.cache  # the same domain for the same ends: what holds it compiles once
+def _between(lower: float, upper: float, *, ordered: bool) -> Domain:
+    """A domain between two finite numbers, from the map of raw numbers to shares of the range (0 to 1) and back."""
+    if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper):
+        raise ValueError(f"Bounds must be two finite numbers in increasing order, but are ({lower}, {upper}).")
+    width = upper - lower
+    share_of, raw_of = (_ordered_shares, _raw_of_ordered_shares) if ordered else (jax.nn.sigmoid, _logit)
+
+    def contains(a: np.ndarray) -> bool:
+        return bool(np.all((a >= lower) & (a <= upper))) and not (ordered and np.any(np.diff(a) <= 0))
+
+    return Domain(
+        f"{'strictly increasing ' * ordered}between {lower:g} and {upper:g}",
+        contains,
+        lambda raw, scale: lower + width * share_of(raw),
+        lambda value, scale: raw_of((value - lower) / width),
+        lower,
+        upper,
+        _steps_up if ordered else None,
+        (lambda raw, scale: width * _slopes_of_ordered_shares(raw)) if ordered else None,
+        (ordered_interval if ordered else interval, (lower, upper)),
+    )

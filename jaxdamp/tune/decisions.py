@@ -17,14 +17,14 @@ from jaxdamp._progress import Progress
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._settings import with_defaults
 from jaxdamp._tables import Column, Contents, Table, plain, typeset_unit
-from jaxdamp._traced import equal, of_known_numbers
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.metrics import Metric
 from jaxdamp.parameters import FreeParameters, free_parameters
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride
 from jaxdamp.tune.scenario_ride import ScenarioRide
-from jaxdamp.tune.scenarios import Road, Scenarios
+from jaxdamp.tune.scenarios import Road, Scenarios, check_roads
 from jaxdamp.tune.settings import RUN, Run
 from jaxdamp.tune.task import outside_ranges
 from jaxdamp.vehicles import AbstractVehicle
@@ -239,13 +239,7 @@ def _check(dampers: object, vehicle: object, roads: object) -> None:
     if not isinstance(roads, WhiteRoad) and (not isinstance(roads, Sequence) or len(roads) < 2):
         remedy = "Take a road class with several seeds: one road says nothing about the next one."
         _checks.refuse("roads", "be two or more roads, or a white one", _checks.described(roads), remedy)
-    listed = [] if isinstance(roads, WhiteRoad) else list(roads)
-    for i, road in enumerate(listed):
-        check_module(f"roads[{i}]", road, (AbstractRoad,), call)
-        again = next((j for j in range(i) if equal(listed[j], road)), None)
-        if again is not None:
-            remedy = "Take several seeds: a road that counts twice makes the error of the mean too small."
-            _checks.refuse(f"roads[{i}]", "be another road than the others", f"roads[{again}] again", remedy)
+    check_roads([] if isinstance(roads, WhiteRoad) else roads, call)
 
 
 def _chosen(car: AbstractVehicle, roads: Sequence[Road], metrics: Sequence[str | Metric] | None) -> list[str | Metric]:

@@ -18,7 +18,6 @@ from jaxdamp.parameters import FreeParameters
 from jaxdamp.tune.limits import percentage
 from jaxdamp.tune.measuring import Measurement
 from jaxdamp.tune.result import V
-from jaxdamp.tune.scenario_ride import smooth_in_scenarios
 from jaxdamp.tune.verdict import relative_change
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -162,8 +161,7 @@ class ParetoFront(AbstractResult, Generic[V]):
         """Every metric of another vehicle of the same kind on the same road, such as a baseline."""
         must, remedy = f"be a {type(self.start).__name__}, as the start", "Compare vehicles of one kind."
         _checks.instance("vehicle", vehicle, type(self.start), must, remedy)
-        smooth = smooth_in_scenarios(self.measured.ride)
-        values = self.measured.reported(self.measured.each(vehicle)) if smooth else self.measured(vehicle)
+        values = self.measured.by_true_risk(vehicle) or self.measured(vehicle)
         return MetricValues.with_units({name: float(values[name]) for name in self.units}, self.units)
 
     plot = drawn_by("pareto", "The front with its knee, the start and other vehicles, and the laws along it.")

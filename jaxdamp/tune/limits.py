@@ -214,11 +214,6 @@ def limit_ends(limits: Iterable[Limit]) -> list[LimitEnd]:
     return [end for end in ends if math.isfinite(end.value)]
 
 
-def margins(ends: Iterable[LimitEnd], values: Mapping[str, float | np.ndarray]) -> np.ndarray:
-    """Relative distances to ends of limits, negative beyond them."""
-    return np.array([end.sign * (end.value - values[end.name]) / end.scale for end in ends])
-
-
 def in_each(allowed: Mapping[str, LimitRange], scenarios: Sequence[str]) -> dict[str, LimitRange]:
     """The ranges of limited metrics in every scenario, by the names of their values there."""
     return {one: span for name, span in allowed.items() for one in in_scenarios(name, scenarios)}

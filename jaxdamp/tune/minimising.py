@@ -16,8 +16,7 @@ from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, MetricValues
 from jaxdamp.solve import Evaluation
 from jaxdamp.tune.combinations import Combinations, beside_next
-from jaxdamp.tune.combining import Driven, every_combination, printed_numbers, rank
-from jaxdamp.tune.descending import Descent, Ended, missed, reached
+from jaxdamp.tune.descending import Descent, Driven, Ended, every_combination, missed, printed_numbers, rank, reached
 from jaxdamp.tune.limits import Limit, LimitEnd, LimitRange, decided, end_moved, in_each, limit_ends, lost_limits
 from jaxdamp.tune.measuring import ride_on
 from jaxdamp.tune.objective import Function, check_objective

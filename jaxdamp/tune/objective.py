@@ -12,11 +12,7 @@ from jaxtyping import Array
 from jaxdamp import _checks
 from jaxdamp._display import plus_minus
 from jaxdamp._types import Scalar
-from jaxdamp.metrics import (
-    Metric,
-    MetricValues,
-    current_name,
-)
+from jaxdamp.metrics import Metric, MetricValues, current_name
 from jaxdamp.tune.limits import Ends, Limits
 from jaxdamp.tune.smooth import exact_counterpart
 from jaxdamp.vehicles import AbstractVehicle, is_stationary

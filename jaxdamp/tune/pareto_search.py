@@ -18,13 +18,13 @@ from jaxdamp.simulation import Ride
 from jaxdamp.solve import SearchState
 from jaxdamp.tune.descending import missed
 from jaxdamp.tune.front import FrontParameter, ParetoFront, non_dominated, shares_of
-from jaxdamp.tune.limits import Limit, limit_ends, margins
+from jaxdamp.tune.limits import Limit
 from jaxdamp.tune.measuring import LANES, ride_on
 from jaxdamp.tune.objective import Function, check_objective
 from jaxdamp.tune.ranges import start_points
 from jaxdamp.tune.rescoring import other_roads
 from jaxdamp.tune.result import V
-from jaxdamp.tune.scenario_ride import ScenarioRide, smooth_in_scenarios
+from jaxdamp.tune.scenario_ride import ScenarioRide
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import DEFAULTS, Settings
 from jaxdamp.tune.smooth import exact_counterpart
@@ -119,7 +119,8 @@ def pareto(
     filled = between if len(chosen) > len(names) else 0
     if filled:
         designs, numbers = _with_designs_between(evaluator, designs, numbers, limits, between)
-    designs, numbers, before = _as_printed(task, designs, numbers, before)
+    designs, numbers = _best_of(names, designs, _by_true_risk(task, designs, numbers))
+    before |= task.measured.by_true_risk(vehicle)
     worst = {name: float(numbers[name].max() + BEYOND * np.ptp(numbers[name])) for name in names}
     fresh, start_on_fresh = _on_fresh_roads(evaluator, designs, settings["fresh_roads"])
     front = ParetoFront[V](
@@ -149,16 +150,6 @@ def pareto(
 def _of_metrics(task: DesignTask[V], numbers: Mapping[str, T]) -> dict[str, T]:
     """The numbers of metrics and objectives among those of a search; none of none."""
     return {name: numbers[name] for name in task.units if numbers}
-
-
-def _as_printed(
-    task: DesignTask[V], designs: np.ndarray, numbers: dict[str, np.ndarray], before: dict[str, float]
-) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str, float]]:
-    """The front and the numbers of the start by the true risk of scenarios where the search has a smooth one."""
-    if not smooth_in_scenarios(task.measured.ride):
-        return designs, numbers, before
-    best = _best_of(task.objective.names, designs, _by_true_risk(task, designs, numbers))
-    return *best, task.measured.reported(task.measured.each(task.vehicle))
 
 
 def _check(objectives: object, vehicle: object, road: object, points: int, counts: Mapping[str, object]) -> None:
@@ -288,7 +279,8 @@ def _with_designs_between(
     allowed = np.all(np.isfinite(list(of_new.values())), axis=0) & np.all(
         np.diff(new, axis=1)[:, ordered] > 0.0, axis=1
     )
-    allowed &= np.all(margins(limit_ends(limits), of_new) >= 0.0, axis=0)
+    for limit in limits:
+        allowed &= (of_new[limit.name] >= limit.lower) & (of_new[limit.name] <= limit.upper)
     designs = np.concatenate([designs, new[allowed]])
     numbers = {name: np.concatenate([values, of_new[name][allowed]]) for name, values in numbers.items()}
     return _best_of(names, designs, numbers)
@@ -312,11 +304,9 @@ def _by_true_risk(
 ) -> dict[str, np.ndarray]:
     """The numbers with metrics joined by the true risk where the search joins them by a smooth one."""
     measured = task.measured if ride is None else task.measured.by(ride)
-    if not smooth_in_scenarios(measured.ride):
-        return dict(numbers)
     cars = [task.space.free.build(jnp.asarray(one, task.space.free.values.dtype)) for one in designs]
-    each = [measured.reported(measured.each(car)) for car in cars]
-    return {**numbers, **{name: np.array([one[name] for one in each]) for name in task.units}}
+    each = [measured.by_true_risk(car) for car in cars]
+    return {**numbers, **{name: np.array([one[name] for one in each]) for name in each[0]}}
 
 
 def _on_fresh_roads(

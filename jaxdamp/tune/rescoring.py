@@ -9,11 +9,9 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp._field_types import check_module
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._settings import with_defaults
 from jaxdamp._tables import Column, Compared, Contents, Table, comparison_table, plain
-from jaxdamp._traced import equal
 from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric
 from jaxdamp.roads import AbstractRoad, WhiteRoad
@@ -21,7 +19,7 @@ from jaxdamp.simulation import Ride, simulate
 from jaxdamp.tune.limits import amount, half_interval, in_scenarios, percentage
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.scenario_ride import exact
-from jaxdamp.tune.scenarios import Road, Scenarios
+from jaxdamp.tune.scenarios import Road, Scenarios, check_roads
 from jaxdamp.tune.settings import RUN, Run
 from jaxdamp.vehicles import AbstractVehicle, frequency_response, linearise
 
@@ -207,13 +205,7 @@ def rescore(
     _checks.instance("result", result, TuneResult, "be the result of a tuning", remedy)
     if isinstance(roads, str) or not isinstance(roads, Sequence) or not roads:
         _checks.refuse("roads", "be a list of one or more", _checks.described(roads), f"The call is `{call}`.")
-    for i, road in enumerate(roads):
-        if not isinstance(road, Scenarios):
-            check_module(f"roads[{i}]", road, (AbstractRoad,), call)
-        again = next((j for j in range(i) if equal(roads[j], road)), None)
-        if again is not None:
-            remedy = "Take several seeds: a road that counts twice makes the error of the mean too small."
-            _checks.refuse(f"roads[{i}]", "be another road than the others", f"roads[{again}] again", remedy)
+    check_roads(roads, call, (Scenarios,))
     metrics, objective = list(result.start.ride_metrics), result.objective
     metrics += [m for m in (objective.metrics if objective else ()) if m not in metrics]
     units = {m.name: m.unit(result.start.units) for m in metrics} | (objective.units(result.start) if objective else {})

@@ -11,7 +11,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._random import sobol_points
-from jaxdamp._traced import of_known_numbers
+from jaxdamp._traced import equal, of_known_numbers
 from jaxdamp._types import Point, Value
 from jaxdamp.metrics import Metric
 from jaxdamp.roads import AbstractRoad, WhiteRoad
@@ -207,6 +207,17 @@ def check_scatter(scatter: object) -> None:
         _checks.positive(f"scatter[{name!r}]", deviation, remedy)
         if not deviation < 1.0 / 3.0:
             _checks.refuse(f"scatter[{name!r}]", "be above 0 and below 1/3", deviation, remedy)
+
+
+def check_roads(roads: Sequence[object], call: str, others: tuple[type, ...] = ()) -> None:
+    """Refuse what is neither a road nor of another kind that may stand for one, and what is there twice."""
+    for i, road in enumerate(roads):
+        if not isinstance(road, others):
+            check_module(f"roads[{i}]", road, (AbstractRoad,), call)
+        again = next((j for j in range(i) if equal(roads[j], road)), None)
+        if again is not None:
+            remedy = "Take several seeds: a road that counts twice makes the error of the mean too small."
+            _checks.refuse(f"roads[{i}]", "be another road than the others", f"roads[{again}] again", remedy)
 
 
 @of_known_numbers

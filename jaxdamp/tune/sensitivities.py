@@ -174,7 +174,11 @@ def _with_curves(
         _checks.positive("reach", reach, "It is a velocity of the damper, such as 0.6 m/s.")
     if asked["dampers"] is None or is_white(road):
         return vehicle, []
-    paths = _curves(vehicle, asked["dampers"])
+    laws = damper_paths(vehicle)
+    paths = matching(laws, asked["dampers"])
+    if not paths:
+        must = f"name a law of the vehicle ({', '.join(laws)})"
+        _checks.refuse("dampers", must, repr(asked["dampers"]), "None for none.")
     reach = reach or _reach(vehicle, road, run)
     for path in paths:
         vehicle = with_hats(vehicle, path, reach, hats)
@@ -201,15 +205,6 @@ def _check(wanted: Sequence[object], vehicle: object, road: object, quantities: 
         _checks.finite("quantities", list(quantities.values()), remedy)
     elif not isinstance(road, Scenarios):
         check_module("road", road, (AbstractRoad, WhiteRoad), call)
-
-
-def _curves(vehicle: AbstractVehicle, pattern: str) -> list[str]:
-    """The laws whose curves are looked at."""
-    paths = damper_paths(vehicle)
-    chosen = matching(paths, pattern)
-    if not chosen:
-        _checks.refuse("dampers", f"name a law of the vehicle ({', '.join(paths)})", repr(pattern), "None for none.")
-    return chosen
 
 
 def _reach(vehicle: AbstractVehicle, road: Road | Scenarios, run: Run) -> float:

@@ -55,27 +55,14 @@ def step_notes(start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable
     return notes
 
 
-def range_notes(
-    start: AbstractVehicle, tuned: AbstractVehicle, rides: Sequence[Callable[[AbstractVehicle], Ride]]
-) -> tuple[list[str], list[str]]:
-    """A sentence for each damper used outside its fitted range, before and after the tuning; and by how much, briefly.
-
-    On a white road, velocities up to three standard deviations are compared.
-    """
-    if not rides:
-        return [], []
-    notes, uses = [], {}
-    for when, vehicle in (("At the start", start), ("After the tuning", tuned)):
-        sentences, uses = outside_ranges(vehicle, rides)
-        notes += [f"{when}{sentence}" for sentence in sentences]
-    return notes, far_outside(uses)
-
-
 def outside_ranges(
     vehicle: AbstractVehicle, rides: Sequence[Callable[[AbstractVehicle], Ride]]
 ) -> tuple[list[str], dict[str, list[RangeUse]]]:
-    """The end of a sentence for each damper used outside its fitted range, and what is used of each range."""
-    if not has_fitted_range(vehicle):
+    """The end of a sentence for each damper used outside its fitted range, and what is used of each range.
+
+    On a white road, velocities up to three standard deviations are compared.
+    """
+    if not rides or not has_fitted_range(vehicle):
         return [], {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", CoarseStepWarning)  # reported by the notes on the step
@@ -184,8 +171,11 @@ class DesignTask(Generic[V]):
         coarse = [[] if white else step_notes(self.vehicle, design, ride_of) for ride_of in rides]
         notes += dict.fromkeys(note for of_ride in coarse for note in of_ride)
         sound = [on for on, bad in zip(rides, coarse, strict=True) if not any("does not bear" in note for note in bad)]
-        ranges, far = range_notes(self.vehicle, design, sound)
-        return notes + ranges, far
+        uses = {}
+        for when, vehicle in (("At the start", self.vehicle), ("After the tuning", design)):
+            sentences, uses = outside_ranges(vehicle, sound)
+            notes += [f"{when}{sentence}" for sentence in sentences]
+        return notes, far_outside(uses)
 
 
 @final
