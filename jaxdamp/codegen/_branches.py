@@ -52,7 +52,8 @@ def in_branches(
     written: list[Statement] = []
     for number, (of, run) in enumerate(runs):
         if of is None:
-            written += [_loop(s, changing) if isinstance(s, Loop) else s for s in run]
+            # what a loop assigns is used in any case
+            written += [Loop(in_branches(s.body, (), set(), changing)) if isinstance(s, Loop) else s for s in run]
             continue
         outside = results.union(names_in(after), *used[:number], *used[number + 1 :])
         shared |= {s.target for s in run if isinstance(s, Define) and s.target.name in outside}
@@ -97,11 +98,6 @@ def _runs(
         return of if of in costly else None
 
     return [(of, list(run)) for of, run in groupby(statements, case)]
-
-
-def _loop(loop: Loop, changing: set[str]) -> Loop:
-    """The same loop, whose assigned variables and ends are used in any case."""
-    return Loop(in_branches(loop.body, (), set(), changing))
 
 
 def _assigned(statement: Statement, shared: set[Variable]) -> list[Statement]:

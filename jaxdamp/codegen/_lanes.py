@@ -178,7 +178,7 @@ def _parts(
         "once": [*printer.lines(parts[0], 0)],
         "of_point": [*printer.lines(parts[OF_POINT], 0), *store],
         "of_step": [*printer.lines(parts[OF_STEP], 0)],
-        "simple": _all(conditions),
+        "simple": " && ".join("!" * (not value) + name for name, value in conditions.items()) or "false",
         "next": assigned((target, printer.atom(value)) for target, value in ends if target.startswith("now")),
     }, steps
 
@@ -193,11 +193,6 @@ def _steps(
         "of_both": Step(places, statements, ends),
         "of_simple": Step(places, simpler, ends) if conditions else Step({}, [], []),
     }
-
-
-def _all(conditions: dict[str, bool]) -> str:
-    """Whether all conditions are what they have to be; false if there are none."""
-    return " && ".join("!" * (not value) + name for name, value in conditions.items()) or "false"
 
 
 def _sorted(statements: list[Statement], levels: dict[str, int], parts: dict[int, list[Statement]]) -> list[Statement]:

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
-from typing import NamedTuple, TypeGuard
+from typing import NamedTuple
 
 from jaxdamp.codegen._program import (
     Assign,
@@ -47,7 +47,7 @@ def kept_values(statements: Sequence[Statement], after: Mapping[str, Atom], resu
     outside |= names_in(s for s in statements if not isinstance(s, Define) or s.target.name not in defined)
     values = []
     for name in filter(defined.__contains__, sorted(outside)):
-        first = _tree(name, defined)
+        first = [s for s in pruned(list(defined.values()), {name}) if isinstance(s, Define)]
         again = moved[name]
         if len(first) >= WORTH_KEEPING and isinstance(again, Variable) and again.dtype == "float64":
             values.append(Kept(defined[name].target, again, first))
@@ -84,11 +84,6 @@ def _ready(statements: Sequence[Define | Table], inside: set[str], after: Mappin
     return ready
 
 
-def _tree(name: str, defined: Mapping[str, Define]) -> list[Define]:
-    """The statements that a value takes, in their order."""
-    return [s for s in pruned(list(defined.values()), {name}) if isinstance(s, Define)]
-
-
 def sums_of_products(statements: Sequence[Statement], inside: set[str], after: Mapping[str, Atom]) -> list[Statement]:
     """The same with products added last to each sum, one after the other, so that each is one multiply-add.
 
@@ -108,19 +103,13 @@ def sums_of_products(statements: Sequence[Statement], inside: set[str], after: M
                 yield s
 
     def in_block(block: Sequence[Statement]) -> Iterator[Statement]:
-        for _, run in groupby(block, lambda s: isinstance(s, Define | Table)):
-            run = list(run)
-            if is_straight(run):
-                yield from in_run(run)
+        for straight, run in groupby(block, lambda s: isinstance(s, Define | Table)):
+            if straight:
+                yield from in_run([s for s in run if isinstance(s, Define | Table)])
             else:
                 yield from (Loop([*in_block(s.body)]) if isinstance(s, Loop) else s for s in run)
 
     return [*in_block(statements)]
-
-
-def is_straight(statements: list[Statement]) -> TypeGuard[list[Define | Table]]:
-    """Whether there are no loops, branches and assignments among statements."""
-    return all(isinstance(statement, Define | Table) for statement in statements)
 
 
 class _Sums:

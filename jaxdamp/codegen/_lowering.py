@@ -202,7 +202,8 @@ def _scan(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Ato
             for array, value in zip(arrays.ravel(), values.ravel(), strict=True):
                 writer.put(Assign(array, value, place))
         _assign(writer, now, after[:carried])
-    return [*now, *(_read(writer, arrays, length) for arrays in saved)]
+    places = [constant(place, COUNTER) for place in range(length)]
+    return [*now, *(np.stack([_entries(writer, arrays, place) for place in places]) for arrays in saved)]
 
 
 def _written_out(writer: Writer, equation: Equation, operands: list[Atoms], ends: tuple[int, int]) -> list[Atoms]:
@@ -220,18 +221,9 @@ def _written_out(writer: Writer, equation: Equation, operands: list[Atoms], ends
     return [*now, *saved]
 
 
-def _read(writer: Writer, arrays: Atoms, length: int) -> Atoms:
-    """What a scan has saved, the steps first."""
-    return array_of((length, *arrays.shape), lambda at: _entry(writer, arrays[at[1:]], constant(at[0], COUNTER)))
-
-
 def _entries(writer: Writer, tables: Atoms, place: Atom) -> Atoms:
     """The entry at a place of each table."""
-    return array_of(tables.shape, lambda at: _entry(writer, tables[at], place))
-
-
-def _entry(writer: Writer, table: Any, place: Atom) -> Atom:
-    return writer.define("look_up", (table, place), table.dtype)
+    return array_of(tables.shape, lambda at: writer.define("look_up", (tables[at], place), tables[at].dtype))
 
 
 def _tables(writer: Writer, array: Atoms, length: int) -> Atoms:

@@ -81,12 +81,8 @@ def with_slopes(
     program = lower(both, arrays, own, of_arrays, of_own)
     parameters = {f"p[{i}]" for i in range(numbers)}
     tangents = {f"dp[{i}][k]" for i in range(slopes)}
-    return _text(signature, program, parameters, tangents, tangents | _names_of(of_own))
-
-
-def _names_of(some: Sequence[Symbols]) -> set[str]:
-    """The names of inputs, without those that are known numbers."""
-    return {name for each in some for name in each.names.ravel() if isinstance(name, str)}
+    moving = {name for each in of_own for name in each.names.ravel() if isinstance(name, str)}  # others are known
+    return _text(signature, program, parameters, tangents, tangents | moving)
 
 
 def _cut(flat: Symbols, shapes: Sequence[tuple[int, ...]]) -> list[Symbols]:

@@ -50,10 +50,6 @@ class SampledStepper(eqx.Module):
         return ControlledStepper(self.controller.stepper)
 
     @property
-    def _clock(self) -> Clock:
-        return Clock(self.controller.loop, self.controller.spacing)
-
-    @property
     def equations(self) -> PyTree:
         """Of the vehicle."""
         return self.controller.stepper.equations
@@ -65,9 +61,9 @@ class SampledStepper(eqx.Module):
 
     def __call__(self, now: tuple[StepState, Scalar], begin: RoadInput, end: RoadInput) -> tuple[StepState, Scalar]:
         """A step later, after what the controller decides at its beginning."""
-        state, count = now
-        decided = self.controller.decided(state, begin, self._clock.flags(count))
-        return self._inner(decided, begin, end), self._clock.after(count)
+        (state, count), clock = now, Clock(self.controller.loop, self.controller.spacing)
+        decided = self.controller.decided(state, begin, clock.flags(count))
+        return self._inner(decided, begin, end), clock.after(count)
 
     def resumed(self, now: tuple[StepState, Scalar], road: RoadInput, ratio: Scalar) -> tuple[StepState, Scalar]:
         """The same instant with other parameters or another step."""
@@ -92,10 +88,9 @@ class ControlledProgram(VehicleProgram):
         used = names_in(self._matrices)
         self.numbers = [n for n in with_first_commands(self) if f"p->{n.name}" in used]
 
-    def vehicle_of(self, values: Numbers) -> AbstractVehicle:
+    def model_of(self, values: Numbers) -> AbstractVehicle:
         """The vehicle with other numbers, its sensors without noise."""
-        vehicle = super().vehicle_of(values)
-        return with_sensors(vehicle, lambda sensors: sensors.without_noise())
+        return with_sensors(super().model_of(values), lambda sensors: sensors.without_noise())
 
     def _prepared(self, values: Numbers, dt: Array) -> PyTree:
         return SampledStepper(Controller(super()._prepared(values, dt), dt))
@@ -129,7 +124,7 @@ def with_first_commands(program: PreparedProgram) -> list[LawNumber]:
     loop: ControlLoop = program.vehicle.system().control
 
     def present(values: Numbers) -> list[Array]:
-        return list(loop.present(program.vehicle_of(values).elements()))
+        return list(loop.present(program.model_of(values).elements()))
 
     first = names_in(lower(present, program.values()))
     about = {"kind": "setting", "meaning": "command before the first sample"}

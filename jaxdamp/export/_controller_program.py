@@ -147,7 +147,7 @@ class ControllerProgram(PreparedProgram):
         return commands + [Line(f"{d}_demand", "N", said.format(of[d])) for d in self.dampers]
 
     def _prepared(self, values: Numbers, dt: Array) -> PyTree:
-        system = self.vehicle_of(values).system()
+        system = self.model_of(values).system()
         return SampledController(system.control, system.laws, dt)
 
     @property

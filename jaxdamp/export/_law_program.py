@@ -96,7 +96,7 @@ class AbstractProgram:
         self._model, self.dtype, self.member = model, dtype, member
         self.numbers = law_numbers(model)
 
-    def _with_numbers(self, values: Sequence[Array]) -> Any:
+    def model_of(self, values: Sequence[Array]) -> Any:
         """The model with other numbers, in the order of `numbers`."""
         model = jax.tree.map(lambda a: jnp.asarray(a, self.dtype) if eqx.is_inexact_array(a) else a, self._model)
         return with_values(model, {n.path: value for n, value in zip(self.numbers, values, strict=True)})
@@ -110,7 +110,7 @@ class AbstractProgram:
         """`margins(p)`: by how much each condition between parameters holds, in the order of `conditions`."""
 
         def margins(values: list[Array]) -> list[Array]:
-            model = self._with_numbers(values)
+            model = self.model_of(values)
             return [jnp.min(getattr(owner, c.parameter) - c.least) for _, owner, c in _conditions(model)]
 
         return lower(margins, self.values())
@@ -154,7 +154,7 @@ class LawProgram(AbstractProgram):
     @cached_property
     def initial_state(self) -> Program:
         """`initial_state(p, x)`: the states at rest."""
-        return lower(lambda values, x: self.law_of(values).state_at_rest(x), self.values(), self._symbols("x"))
+        return lower(lambda values, x: self.model_of(values).state_at_rest(x), self.values(), self._symbols("x"))
 
     @cached_property
     def force_derivative(self) -> Program:
@@ -184,20 +184,16 @@ class LawProgram(AbstractProgram):
     def _derivative(self, function: Callable, arguments: tuple, changes: tuple) -> Program:
         return lower(lambda point, change: jax.jvp(function, point, change)[1], arguments, changes)
 
-    def law_of(self, values: list[Array]) -> AbstractDamper:
-        """The law with other numbers, in the order of `numbers`."""
-        return self._with_numbers(values)
-
     def _force(self, values: list[Array], x: Array, v: Array, state: Array) -> Array:
-        return self.law_of(values).force(x, v, state)
+        return self.model_of(values).force(x, v, state)
 
     def _state_rate(self, values: list[Array], x: Array, v: Array, state: Array) -> Array:
-        return self.law_of(values).state_rate(x, v, state)
+        return self.model_of(values).state_rate(x, v, state)
 
     def _advance(
         self, values: list[Array], x0: Array, v0: Array, x1: Array, v1: Array, dt: Array, state: Array
     ) -> Array:
-        return self.law_of(values).advance(x0, v0, x1, v1, state, dt)
+        return self.model_of(values).advance(x0, v0, x1, v1, state, dt)
 
     def _point(self, d: str = "") -> tuple[PyTree[Symbols], ...]:
         return self.values(f"{d}p"), self._symbols(f"{d}x"), self._symbols(f"{d}v"), self._state(d)

@@ -121,11 +121,11 @@ class RideProgram(VehicleProgram):
         motion, states, *road = self._point(of="c")
         return self._lowered(moving, motion, states, *road)
 
-    def vehicle_of(self, values: Numbers) -> AbstractVehicle:
+    def model_of(self, values: Numbers) -> AbstractVehicle:
         """The vehicle with other numbers, those of the law and its own."""
         of_law, of_vehicle = values
         car = with_values(self.vehicle, {n.path: value for n, value in zip(self.numbers, of_vehicle, strict=True)})
-        return self._placed(car, self.law.law_of(of_law))
+        return self._placed(car, self.law.model_of(of_law))
 
     def values(self, owner: str = "p") -> PyTree[Symbols]:
         """The numbers of the law, and those of the vehicle."""
@@ -139,7 +139,7 @@ class RideProgram(VehicleProgram):
         """The numbers of the vehicle, and whether they place its points or its wheels."""
 
         def places(values: list[Array]) -> PyTree[Array]:
-            frame = self.vehicle_of(([number.value for number in self.law.numbers], values)).frame()
+            frame = self.model_of(([number.value for number in self.law.numbers], values)).frame()
             points = [*(link.extension for link in frame.links), *(wheel.point for wheel in frame.wheels)]
             return matrix(points, frame.coordinates), [(wheel.behind, wheel.left) for wheel in frame.wheels]
 

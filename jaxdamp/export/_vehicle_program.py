@@ -135,10 +135,6 @@ class PreparedProgram(AbstractProgram):
 
         return self._lowered(start, *self._inputs)
 
-    def vehicle_of(self, values: Numbers) -> AbstractVehicle:
-        """The vehicle with other numbers, in the order of `numbers`."""
-        return self._with_numbers(values)
-
     @property
     def _carried(self) -> list[Symbols]:
         return self._carry.symbols("c", self.dtype)
@@ -193,7 +189,7 @@ class VehicleProgram(PreparedProgram):
         return [channel for channel in self.layout.channels if channel.kind is not ChannelKind.ROAD_HEIGHT]
 
     def _prepared(self, values: Numbers, dt: Array) -> PyTree:
-        return Exponential().stepper(Equations(self.vehicle_of(values).system(), MemoryLayout.SCALARS), dt)
+        return Exponential().stepper(Equations(self.model_of(values).system(), MemoryLayout.SCALARS), dt)
 
     def _started(self, held: list[Array], *inputs: Array) -> PyTree:
         """At rest in the static equilibrium on a road."""
@@ -239,7 +235,7 @@ class VehicleProgram(PreparedProgram):
         """The changes of the rates of the states and of the channels for changes of p, x, h and r."""
 
         def observed(values: Numbers, *point: PyTree) -> PyTree:
-            equations = Equations(self.vehicle_of(values).system(), MemoryLayout.SCALARS)
+            equations = Equations(self.model_of(values).system(), MemoryLayout.SCALARS)
             return self._observed(equations, *point)
 
         arguments, changes = (self.values(), *self._point()), (self.values("dp"), *self._point("d"))

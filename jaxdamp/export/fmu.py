@@ -9,7 +9,7 @@ import sys
 import tempfile
 import xml.etree.ElementTree as ET
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
@@ -23,11 +23,11 @@ from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.export._c_text import controller_source, law_source, vehicle_source
 from jaxdamp.export._controlled_program import ControlledProgram
-from jaxdamp.export._controller_program import ControllerProgram, program_of
+from jaxdamp.export._controller_program import ControllerProgram, Line, program_of
 from jaxdamp.export._fmu_limits import GREATEST, in_fmi, limits, margins, tables
-from jaxdamp.export._law_program import LawNumber, LawProgram, identifier
+from jaxdamp.export._law_program import LawProgram, identifier
 from jaxdamp.export._vehicle_program import LONGEST_STEP, PreparedProgram, VehicleProgram
-from jaxdamp.vehicles import AbstractVehicle
+from jaxdamp.vehicles import AbstractVehicle, Channel
 
 
 _NAMES, _SYMBOLS = "kilogram meter second ampere kelvin mole radian", "kg m s A K mol rad"
@@ -56,15 +56,14 @@ class Variable(NamedTuple):
 
 def variables(program: AnyProgram, longest_step: float) -> list[Variable]:
     """All variables, in the order of unit.c: values and rates of the inputs, outputs, numbers, states, their rates."""
-    if isinstance(program, ControllerProgram):
-        signals = _of_controller(program)
-    else:
-        signals = _of_law(program) if isinstance(program, LawProgram) else _of_vehicle(program)
+    inputs, outputs = _signals(program)
+    listed = [Variable(line.name, line.unit, _INPUT | {"description": line.description}, 0.0) for line in inputs]
+    listed += [Variable(line.name, line.unit, _OUTPUT | {"description": line.description}) for line in outputs]
     words = (
         "longest step of the model, right for its numbers as exported; shorten it for steeper laws or lighter wheels"
     )
     said = {"description": f"{words}. Longer communication steps are divided"}
-    listed = [*signals, Variable("longest_step", "s", _FIXED | said, longest_step, (_SHORTEST, np.inf))]
+    listed.append(Variable("longest_step", "s", _FIXED | said, longest_step, (_SHORTEST, np.inf)))
     listed += _of_numbers(program)
     if not program.numbers:
         listed.append(Variable("none", "", _FIXED, 0.0))
@@ -76,27 +75,16 @@ def variables(program: AnyProgram, longest_step: float) -> list[Variable]:
     return listed
 
 
-def _of_law(program: LawProgram) -> Iterator[Variable]:
-    yield Variable("x", "m", _INPUT | {"description": "stroke, positive in extension"}, 0.0)
-    yield Variable("v", "m/s", _INPUT | {"description": "velocity, positive in extension"}, 0.0)
-    yield Variable("F", "N", _OUTPUT | {"description": "force, positive when it resists extension"})
-
-
-def _of_vehicle(program: VehicleProgram) -> Iterator[Variable]:
-    for height in program.heights:
-        yield Variable(height.name, "m", _INPUT | {"description": height.description}, 0.0)
-    for height in program.heights:
-        said = f"rate of {height.name}; in co-simulation it follows from the heights as long as it is zero"
-        yield Variable(f"{height.name}_rate", "m/s", _INPUT | {"description": said}, 0.0)
-    for channel in program.channels:
-        yield Variable(channel.name, channel.unit, _OUTPUT | {"description": channel.description})
-
-
-def _of_controller(program: ControllerProgram) -> Iterator[Variable]:
-    for line in program.inputs:
-        yield Variable(line.name, line.unit, _INPUT | {"description": line.description}, 0.0)
-    for line in program.outputs:
-        yield Variable(line.name, line.unit, _OUTPUT | {"description": line.description})
+def _signals(program: AnyProgram) -> tuple[Sequence[Line | Channel], Sequence[Line | Channel]]:
+    """Inputs and outputs."""
+    if isinstance(program, ControllerProgram):
+        return program.inputs, program.outputs
+    if isinstance(program, LawProgram):
+        motion = [Line("x", "m", "stroke, positive in extension"), Line("v", "m/s", "velocity, positive in extension")]
+        return motion, [Line("F", "N", "force, positive when it resists extension")]
+    said = "rate of {}; in co-simulation it follows from the heights as long as it is zero"
+    rates = [Line(f"{height.name}_rate", "m/s", said.format(height.name)) for height in program.heights]
+    return [*program.heights, *rates], program.channels
 
 
 def _of_states(program: AnyProgram, first: int) -> list[Variable]:
@@ -115,19 +103,15 @@ def _of_states(program: AnyProgram, first: int) -> list[Variable]:
     ]
 
 
-def _of_numbers(program: AnyProgram) -> list[Variable]:
-    return [variable for number in program.numbers for variable in _of_number(number)]
-
-
-def _of_number(number: LawNumber) -> Iterator[Variable]:
+def _of_numbers(program: AnyProgram) -> Iterator[Variable]:
     """One variable for each number; `terms.0.knots` becomes `terms[0].knots[1]`."""
-    name = in_fmi(number.path)
     causes = {"parameter": _FIXED | {"variability": "tunable"}, "setting": _FIXED, "command": _INPUT}
-    about = causes[number.kind] | {"description": number.meaning}
-    for index in np.ndindex(*number.value.shape):
-        place = f"[{','.join(map(str, index))}]" if index else ""
-        ends = limits(number.domain, index[-1] if index else 0)
-        yield Variable(name + place, number.unit, about, float(number.value[index]), ends)
+    for number in program.numbers:
+        about = causes[number.kind] | {"description": number.meaning}
+        for index in np.ndindex(*number.value.shape):
+            place = f"[{','.join(map(str, index))}]" if index else ""
+            ends = limits(number.domain, index[-1] if index else 0)
+            yield Variable(in_fmi(number.path) + place, number.unit, about, float(number.value[index]), ends)
 
 
 def description(program: AnyProgram, known: list[Variable], name: str, guid: str) -> str:

@@ -198,12 +198,20 @@ def label_ends(axes: Axes, lines: Sequence["matplotlib.lines.Line2D"], *, outsid
         axes.annotate(str(line.get_label()), to, xycoords="axes fraction", **look)
 
 
-def dress(axes: Axes, x: str, y: str, title: str = "", *, turns: Literal["", "y", "xy"] = "") -> None:
+def dress(
+    axes: Axes,
+    x: str,
+    y: str,
+    title: str = "",
+    *,
+    turns: Literal["", "y", "xy"] = "",
+    zero: Literal["", "x", "y", "xy"] = "",
+) -> None:
     """Labels, a light grid, and no frame above and to the right; ticks in the units and the sign that are shown.
 
     The numbers drawn are those of the library: where the labels name a unit that is shown otherwise, the ticks are
     round numbers of the other unit, and an axis of the other sign runs the other way: one whose label has the sign, or
-    that is among those that `turns` names.
+    that is among those that `turns` names. Lines are drawn where x or y is zero, if `zero` names it.
     """
     label_axis(axes, "x", x, turns="x" in turns)
     label_axis(axes, "y", y, turns="y" in turns)
@@ -212,6 +220,7 @@ def dress(axes: Axes, x: str, y: str, title: str = "", *, turns: Literal["", "y"
     axes.grid(True, color="0.9", linewidth=0.8)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
+    cross(axes, horizontal="y" in zero, vertical="x" in zero)
 
 
 def cross(axes: Axes, horizontal: bool = True, vertical: bool = True) -> None:

@@ -3,7 +3,6 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -81,8 +80,7 @@ def force_velocity(
         _checks.one_of("bands", name, laws)
     curves, gaps = draw_laws(axes, laws, points, baseline, bands)
     shaded = fitted_range.shade(axes, laws.values(), points)
-    _style.dress(axes, _style.VELOCITY, _style.FORCE, title or _title(alone, runs))
-    _style.cross(axes)
+    _style.dress(axes, _style.VELOCITY, _style.FORCE, title or _title(alone, runs), zero="xy")
     axes.set_xlim(float(points.min()), float(points.max()))
     _name(axes, measured, curves, shaded)
     force = _style.quantity(static_force, "N", "static force")
@@ -172,8 +170,7 @@ def force_velocity_family(table: ForceVelocityTable, *, page: bool = False) -> F
     for index, curve in enumerate(table.curves):
         look = {"color": _style.graded(index, len(table.curves)), "label": curve.setting or table.name}
         handles += axes.plot(np.asarray(curve.velocity), np.asarray(curve.force), "o-", markersize=4.0, **look)
-    _style.dress(axes, _style.VELOCITY, _style.FORCE, f"Force over velocity: {table.name}")
-    _style.cross(axes)
+    _style.dress(axes, _style.VELOCITY, _style.FORCE, f"Force over velocity: {table.name}", zero="xy")
     if below is None:
         _style.legend_beside(figure, handles, "setting" if len(handles) > 1 else "")
         return figure
@@ -202,15 +199,6 @@ _CYCLES, _SAMPLES = 3, 400  # to settle, and in a cycle
 _MOST_CURVES = 8
 
 
-class _Loops(NamedTuple):
-    """Last cycles at all frequencies: arrays of shape (frequencies, samples), the effects with one axis more."""
-
-    stroke: np.ndarray
-    velocity: np.ndarray
-    force: np.ndarray
-    effects: np.ndarray  # derivative of the force by each number, times its value
-
-
 @eqx.filter_jit
 def _response(free: FreeParameters, dt: jax.Array, x: jax.Array, v: jax.Array) -> tuple[jax.Array, jax.Array]:
     def force(values: jax.Array) -> tuple[jax.Array, jax.Array]:
@@ -221,7 +209,8 @@ def _response(free: FreeParameters, dt: jax.Array, x: jax.Array, v: jax.Array) -
     return forces, slopes * free.values[None, :]
 
 
-def _loops(law: AbstractDamper, amplitude: float, frequencies: Sequence[float]) -> _Loops:
+def _loops(law: AbstractDamper, amplitude: float, frequencies: Sequence[float]) -> list[np.ndarray]:
+    """Stroke, velocity, force, and its derivative by each number times this, in the last cycle at each frequency."""
     free = free_parameters(law)
     phase = 2 * np.pi * np.arange(_CYCLES * _SAMPLES + 1) / _SAMPLES
     rows = []
@@ -229,7 +218,7 @@ def _loops(law: AbstractDamper, amplitude: float, frequencies: Sequence[float]) 
         x, v = amplitude * np.sin(phase), 2 * np.pi * frequency * amplitude * np.cos(phase)
         response = _response(free, *(jnp.asarray(a) for a in (1.0 / (frequency * _SAMPLES), x, v)))
         rows.append([np.asarray(a)[-_SAMPLES - 1 :] for a in (x, v, *response)])
-    return _Loops(*(np.stack(column) for column in zip(*rows, strict=True)))
+    return [np.stack(column) for column in zip(*rows, strict=True)]
 
 
 @of_known_numbers
@@ -257,33 +246,30 @@ def law_card(
     check_module("law", law, (AbstractDamper,), "law_card(law)")
     _checks.positive("amplitude", amplitude)
     _checks.positive("frequencies", np.asarray(frequencies))
-    loops = _loops(without_fitted_ranges(law), float(amplitude), frequencies)
+    stroke, velocity, force, change = _loops(without_fitted_ranges(law), float(amplitude), frequencies)
     figure = _style.new_figure(13.0, 3.9)
     over_velocity, over_stroke, effects = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.15))
     for index, frequency in enumerate(frequencies):
         look = {"color": _style.graded(index, len(frequencies)), "linewidth": 1.6}
-        fitted_range.curve(over_velocity, law, loops.velocity[index], loops.force[index], **look)
-        over_stroke.plot(1e3 * loops.stroke[index], loops.force[index], label=f"{frequency:g} Hz", **look)
+        fitted_range.curve(over_velocity, law, velocity[index], force[index], **look)
+        over_stroke.plot(1e3 * stroke[index], force[index], label=f"{frequency:g} Hz", **look)
     fastest = int(np.argmax(frequencies))
-    sizes = np.max(np.abs(loops.effects[fastest]), axis=0)
+    sizes = np.max(np.abs(change[fastest]), axis=0)
     drawn = [int(i) for i in np.argsort(-sizes, kind="stable")[:_MOST_CURVES] if sizes[i] > 0]
     names = free_parameters(law).names
     for number, i in enumerate(drawn):
-        curve = loops.effects[fastest][:, i]
-        effects.plot(
-            loops.velocity[fastest], curve, label=_style.in_words(names[i]), linewidth=1.4, **_style.line_style(number)
-        )
+        look = {"label": _style.in_words(names[i]), "linewidth": 1.4, **_style.line_style(number)}
+        effects.plot(velocity[fastest], change[fastest][:, i], **look)
     left_out = int(np.count_nonzero(sizes)) - len(drawn)
     more = f", {left_out} more" if left_out else ""
-    _style.dress(over_velocity, _style.VELOCITY, _style.FORCE)
-    _style.dress(over_stroke, _style.STROKE, "force [N]", turns="y")
-    _style.dress(effects, f"velocity [m/s]   (+ rebound), {frequencies[fastest]:g} Hz", "effect p ∂F/∂p [N]")
-    reach = float(np.max(np.abs(loops.velocity)))
+    _style.dress(over_velocity, _style.VELOCITY, _style.FORCE, zero="xy")
+    _style.dress(over_stroke, _style.STROKE, "force [N]", turns="y", zero="xy")
+    speed = f"velocity [m/s]   (+ rebound), {frequencies[fastest]:g} Hz"
+    _style.dress(effects, speed, "effect p ∂F/∂p [N]", zero="xy")
+    reach = float(np.max(np.abs(velocity)))
     points = np.linspace(-reach, reach, 2001)
     shaded = fitted_range.shade(over_velocity, [law], points)
     fitted_range.shade(effects, [law], points, "_nolegend_")
-    for axes in (over_velocity, over_stroke, effects):
-        _style.cross(axes)
     _style.legend_beside(figure, effects.get_legend_handles_labels()[0], f"effect of{more}")
     heading = f"loops of ±{1e3 * amplitude:g} mm at"
     _style.legend_beside(figure, [*over_stroke.get_legend_handles_labels()[0], *shaded], heading, "lower")

@@ -160,8 +160,7 @@ def _force_velocity(
         axes.fill_between(_MM * np.asarray(band.velocity), band.lower, band.upper, **ends)
     if limits is not None:
         _tolerances(axes, limits, damper.static)
-    _style.dress(axes, "velocity [mm/s]", "force [N]", _force_title(damper), turns="xy")
-    _style.cross(axes)
+    _style.dress(axes, "velocity [mm/s]", "force [N]", _force_title(damper), turns="xy", zero="xy")
     axes.set_xlim(-1.05 * reach, 1.05 * reach)
     if len(damper.evaluation.settings) > 1:
         _style.label_ends(axes, lines if damper.fit is None else axes.get_lines()[-len(damper.laws) :])
@@ -273,8 +272,7 @@ def _loops(axes: Axes, damper: _Damper) -> None:
     fastest, slowest = (_style.short(_MM * shown[i].peak_velocity) for i in (-1, 0))
     speeds = f"{slowest} to {fastest} mm/s (light)" if len(shown) > 1 else f"{fastest} mm/s"
     title = f"Loops, {speeds}" + ("\nbroad: measured, thin: law" if fitted else "")
-    _style.dress(axes, "stroke [mm]", "force [N]", title, turns="xy")
-    _style.cross(axes)
+    _style.dress(axes, "stroke [mm]", "force [N]", title, turns="xy", zero="xy")
 
 
 def _errors(axes: Axes, damper: _Damper) -> None:

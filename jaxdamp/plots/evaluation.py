@@ -46,12 +46,10 @@ def records(runs: BenchRun | Iterable[BenchRun], *, most: int = 12) -> Figure:
         panels["x"].plot(1e3 * run.stroke[part], run.force[part], **look)
         panels["stroke"].plot(run.time - run.time[0], 1e3 * run.stroke, **look)
         handles += panels["force"].plot(run.time - run.time[0], run.force, label=with_speed(run), **look)
-    _style.dress(panels["v"], _style.VELOCITY, _style.FORCE, "Last full cycle: force over velocity")
-    _style.dress(panels["x"], _style.STROKE, _style.FORCE, "Force over stroke")
-    _style.dress(panels["stroke"], "", "stroke [mm]\n(+ rebound)", "Whole records")
-    _style.dress(panels["force"], "time [s]", "force [N]\n(+ resists extension)")
-    for name, axes in panels.items():
-        _style.cross(axes, vertical=name in "vx")
+    _style.dress(panels["v"], _style.VELOCITY, _style.FORCE, "Last full cycle: force over velocity", zero="xy")
+    _style.dress(panels["x"], _style.STROKE, _style.FORCE, "Force over stroke", zero="xy")
+    _style.dress(panels["stroke"], "", "stroke [mm]\n(+ rebound)", "Whole records", zero="y")
+    _style.dress(panels["force"], "time [s]", "force [N]\n(+ resists extension)", zero="y")
     _style.legend_beside(figure, handles, f"{len(shown)} of {len(runs)} records" if len(shown) < len(runs) else "")
     return figure
 
@@ -117,8 +115,7 @@ def gas_and_friction(found: GasAndFriction) -> Figure:
     figure = _style.new_figure(9.0, 5.0)
     axes = figure.subplots()
     both_directions(axes, found)
-    _style.dress(axes, _style.STROKE, _style.FORCE, f"{found.record}: {gas_and_friction_words(found)}")
-    _style.cross(axes)
+    _style.dress(axes, _style.STROKE, _style.FORCE, f"{found.record}: {gas_and_friction_words(found)}", zero="xy")
     return figure
 
 

@@ -53,7 +53,10 @@ def shade(axes: Axes, laws: Iterable[AbstractDamper], velocities: Points, label:
 
 def shade_channel(axes: Axes, responses: Iterable[Response], channel: str) -> None:
     """Shade velocities outside those of the records, if the channel is the velocity of a damper."""
-    laws = [law for law in (_law_of(response, channel) for response in responses) if law is not None]
+    laws: list[AbstractDamper] = []
+    for response in responses:
+        pairs = zip(response.vehicle.frame().element_names, response.vehicle.elements(), strict=True)
+        laws += [law for name, law in pairs if channel == f"{name}_velocity"]
     if not laws:
         return
     low, high = axes.get_ylim()
@@ -62,13 +65,6 @@ def shade_channel(axes: Axes, responses: Iterable[Response], channel: str) -> No
     for start, stop in _stretches(outside):
         axes.axhspan(points[start], points[stop - 1], color=_style.SHADE, linewidth=0.0, zorder=0.1)
     axes.set_ylim(low, high)
-
-
-def _law_of(response: Response, channel: str) -> AbstractDamper | None:
-    """The law that a velocity channel belongs to."""
-    names = response.vehicle.frame().element_names
-    at = [i for i, name in enumerate(names) if channel == f"{name}_velocity"]
-    return response.vehicle.elements()[at[0]] if at else None
 
 
 def footnotes(figure: Figure, responses: Mapping[str, Response]) -> None:

@@ -32,8 +32,7 @@ def modes(result: Modes) -> Figure:
         amplitude = np.abs(shape) * np.where(np.real(shape) < 0, -1.0, 1.0)
         axes.barh(rows, amplitude, 0.6, color=[_style.COLOURS[1 if a < 0 else 0] for a in amplitude])
         axes.set_xlim(-1.1, 1.1)
-        _style.dress(axes, "amplitude [–]", "", f"{frequency:.3g} Hz, damping ratio {ratio:.2g}")
-        _style.cross(axes, horizontal=False)
+        _style.dress(axes, "amplitude [–]", "", f"{frequency:.3g} Hz, damping ratio {ratio:.2g}", zero="x")
     panels[0].set_yticks(rows, result.coordinates)
     panels[0].invert_yaxis()
     return figure

@@ -125,8 +125,7 @@ def loops_by_law(comparison: Comparison, record: str | None = None) -> Figure:
         best = ", recommended" * (rung is comparison.best)
         error = _style.quantity(rung.error, "N").replace(" ", "\N{NO-BREAK SPACE}")
         words = f"{_style.in_words(rung.name)}: {error}{best}"
-        _style.dress(axes, _style.VELOCITY, "force [N]", words, turns="y")
-        _style.cross(axes)
+        _style.dress(axes, _style.VELOCITY, "force [N]", words, turns="y", zero="xy")
         _axes.few_ticks(axes, 4)
         axes.label_outer()
     for axes in panels.flat[len(shown) :]:

@@ -74,8 +74,7 @@ def targets(result: TargetFit) -> Figure:
     axes.plot([met.deviation for met in result.targets], rows, "o", color=_style.COLOURS[0])
     axes.set_yticks(rows, [f"{t.name}: {_style.short(t.value)} for {_style.short(t.target)}" for t in result.targets])
     axes.set_ylim(len(rows) - 0.5, -0.5)
-    _style.dress(axes, "distance from the target [tolerances]", "", "Reached and wanted")
-    _style.cross(axes, horizontal=False)
+    _style.dress(axes, "distance from the target [tolerances]", "", "Reached and wanted", zero="x")
     return figure
 
 
@@ -96,8 +95,7 @@ def rescore(result: Rescore) -> Figure:
     means = axes.plot([c.mean() for c in changes], rows, "|", color=_style.BLACK, markersize=14, label="mean")
     axes.set_yticks(rows, [_style.metric_words(n) + " (minimised)" * (n == result.metric) for n in names])
     axes.set_ylim(len(names) - 0.5, -0.5)
-    _style.dress(axes, "change by the tuning [%]", "", f"Ride metrics on {result.roads} other roads")
-    _style.cross(axes, horizontal=False)
+    _style.dress(axes, "change by the tuning [%]", "", f"Ride metrics on {result.roads} other roads", zero="x")
     _style.legend_beside(figure, [*dots, *means])
     return figure
 
@@ -142,9 +140,8 @@ def damper_comparison(comparison: DamperComparison) -> Figure:
     axes.invert_yaxis()
     roads = len(next(iter(comparison.values[first].values())))
     where = f"on the same {roads} roads" if roads > 1 else "on a white road"
-    _style.dress(axes, "change [%]", "", f"Ride metrics beside those of {first}, {where}")
+    _style.dress(axes, "change [%]", "", f"Ride metrics beside those of {first}, {where}", zero="x")
     axes.grid(False, axis="y")
-    _style.cross(axes, horizontal=False)
     _style.legend_above(figure, handles)
     legend = "With 95 % intervals; hollow where there may be no difference; thick: standard error from the parameters."
     _style.note_below(figure, [legend, *map(_style.said, comparison.warnings)])

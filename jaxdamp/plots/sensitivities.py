@@ -40,10 +40,9 @@ def valving(result: ValvingResult) -> Figure:
             shade = axes.axvspan(*span, color=_style.SHADE, zorder=0, label="out of reach")
         if part is result.out_of_reach[0]:
             handles.append(shade)
-    _style.dress(forces, "", _style.FORCE, f"Valving: wanted and reached force, error {result.error_percent:.2g} %")
-    _style.dress(errors, _style.VELOCITY, "error [N]")
-    for axes in (forces, errors):
-        _style.cross(axes)
+    title = f"Valving: wanted and reached force, error {result.error_percent:.2g} %"
+    _style.dress(forces, "", _style.FORCE, title, zero="xy")
+    _style.dress(errors, _style.VELOCITY, "error [N]", zero="xy")
     _style.legend_above(figure, handles, 4)
     _style.note_below(figure, [result.summary])
     return figure
@@ -77,9 +76,8 @@ def sensitivity(result: Sensitivity, *, most: int = MOST) -> Figure:
         axes.barh(np.arange(len(names)), values, 0.65, color=colours)
         axes.set_yticks(np.arange(len(names)), names if column == 0 else [""] * len(names))
         axes.invert_yaxis()
-        _style.dress(axes, "change for +1 % [%]", "", _style.metric_words(metric))
+        _style.dress(axes, "change for +1 % [%]", "", _style.metric_words(metric), zero="x")
         axes.grid(False, axis="y")
-        _style.cross(axes, horizontal=False)
     return figure
 
 
@@ -97,8 +95,7 @@ def record_sensitivity(result: RecordSensitivity) -> Figure:
         for number, (record, slopes) in enumerate(zip(result.records, result.by_sample[name], strict=True)):
             colour = _style.COLOURS[number % len(_style.COLOURS)]
             axes.plot(result.velocity[number], 10.0 * slopes, ".", ms=2.5, color=colour, label=record)
-        _style.dress(axes, _style.VELOCITY, "change for 10 N more in one sample", name)
-        _style.cross(axes)
+        _style.dress(axes, _style.VELOCITY, "change for 10 N more in one sample", name, zero="xy")
         if column == 0 and len(result.records) <= MOST:
             axes.legend()
     return figure
@@ -129,5 +126,4 @@ def _band(figure: Figure, axes: Axes, result: Sensitivity, damper: str, metric: 
     axes.set_xlim(velocity[0], velocity[-1])
     axes.autoscale(axis="y")
     figure.colorbar(band, ax=axes, label="change for +100 N (upwards) [%]")
-    _style.dress(axes, _style.VELOCITY, _style.FORCE, f"{damper}: {_style.metric_words(metric)}")
-    _style.cross(axes)
+    _style.dress(axes, _style.VELOCITY, _style.FORCE, f"{damper}: {_style.metric_words(metric)}", zero="xy")

@@ -67,8 +67,7 @@ def _law(curves: Axes, name: str, pair: tuple[AbstractDamper, AbstractDamper], p
     for law, when, style in zip(pair, ("before", "after"), (_style.BEFORE, _style.AFTER), strict=True):
         gaps += fitted_range.settled(curves, law, points, f"{name} {when}", label=when, **style)[1]
     fitted_range.shade(curves, pair, points)
-    _style.dress(curves, _style.VELOCITY, _style.FORCE, name)
-    _style.cross(curves)
+    _style.dress(curves, _style.VELOCITY, _style.FORCE, name, zero="xy")
     curves.legend(loc="upper left", frameon=False)
     return gaps
 
@@ -106,9 +105,8 @@ def _bars(axes: Axes, result: TuneResult) -> None:
     axes.set_yticks(rows, labels, fontsize="small")
     axes.invert_yaxis()
     axes.margins(x=0.08)
-    _style.dress(axes, "change [%]", "", "Ride metrics")
+    _style.dress(axes, "change [%]", "", "Ride metrics", zero="x")
     axes.grid(False, axis="y")
-    _style.cross(axes, horizontal=False)
 
 
 def _spectrum(axes: Axes, channel: str, unit: str, pair: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
@@ -223,5 +221,4 @@ def _curves(
         knee = i == front.knee
         colour = _style.COLOURS[1] if knee else _style.graded(float(shades[i]))
         axes.plot(points, force, color=colour, linewidth=2.2 if knee else 1.1, zorder=3 if knee else 2)
-    _style.dress(axes, _style.VELOCITY, _style.FORCE, f"{title}, in the colours of the front")
-    _style.cross(axes)
+    _style.dress(axes, _style.VELOCITY, _style.FORCE, f"{title}, in the colours of the front", zero="xy")

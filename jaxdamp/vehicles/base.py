@@ -90,7 +90,7 @@ class AbstractVehicle(AbstractDeclared):
         Raises:
             ValueError: an unknown name or channel, with the nearest known one; the message names `argument`.
         """
-        return chosen_metrics(self.layout.metrics, self.layout.by_name, wanted, argument, white=white)
+        return chosen_metrics(self.layout, wanted, argument, white=white)
 
     def goal_metrics(self, goal: str, *, white: bool = False) -> list[str]:
         """The names of the ride metrics that a short name means: "comfort", "travel" or "grip"; or of one metric.
@@ -113,7 +113,7 @@ class AbstractVehicle(AbstractDeclared):
         if goal not in GOALS:
             _checks.one_of("goal", current_name(goal, [m.name for m in self.layout.metrics]), self.metric_words)
             return [goal]
-        return metrics_of_goal(self.layout.metrics, self.layout.by_name, goal, white=white)
+        return metrics_of_goal(self.layout, goal, white=white)
 
     @property
     def metric_words(self) -> list[str]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from jaxdamp import _checks
 from jaxdamp.metrics import Metric, current_names
 from jaxdamp.vehicles.channels import LIFT_OFF_FRACTIONS, Channel, ChannelKind
+from jaxdamp.vehicles.system import Layout
 
 
 # The short names of what a rider and a designer want: kind of the channel, statistic, whether it is weighted.
@@ -30,33 +31,25 @@ def is_stationary(metric: Metric, channels: Mapping[str, Channel]) -> bool:
     return metric.statistic.of_rms is not None and not (unbounded or metric.by or metric.window)
 
 
-def metrics_of_goal(
-    metrics: Sequence[Metric], channels: Mapping[str, Channel], goal: str, *, white: bool = False
-) -> list[str]:
+def metrics_of_goal(layout: Layout, goal: str, *, white: bool = False) -> list[str]:
     """The names of the ride metrics that a short name means, as `goal_metrics` says."""
-    kind, statistic, weighted = GOALS[goal]
+    channels, (kind, statistic, weighted) = layout.by_name, GOALS[goal]
     statistic = "standard_deviation" if white and kind is ChannelKind.STROKE else statistic
     names = [
         m.name
-        for m in metrics
+        for m in layout.metrics
         if channels[m.channel].kind is kind and m.statistic.name == statistic and (m.weighting is not None) == weighted
     ]
     return names[:1] if goal == "comfort" else names
 
 
 def chosen_metrics(
-    metrics: Sequence[Metric],
-    channels: Mapping[str, Channel],
-    wanted: Sequence[str | Metric] | None,
-    argument: str,
-    *,
-    white: bool = False,
+    layout: Layout, wanted: Sequence[str | Metric] | None, argument: str, *, white: bool = False
 ) -> list[Metric]:
     """The requested metrics, checked and with their weightings.
 
     Arguments:
-        metrics: the predefined ride metrics of the vehicle.
-        channels: channels of the vehicle, by name.
+        layout: of the vehicle.
         wanted: names of ride metrics, or metrics of any channel; "comfort", "travel" and "grip" mean those of
             `goal_metrics`; None for all ride metrics.
         argument: name of this argument in error messages.
@@ -66,23 +59,21 @@ def chosen_metrics(
         ValueError: an empty list; an unknown name or channel, with the nearest known one; a weighting of a channel that
             is not an acceleration; two metrics of one name.
     """
-    known = {m.name: m for m in metrics}
+    known = {m.name: m for m in layout.metrics}
     if wanted is None:
-        return list(metrics)
+        return list(layout.metrics)
     if isinstance(wanted, Metric):
         _checks.refuse(argument, "be a list", "one Metric", f"Write `{argument}=[metric]`.")
     if not len(wanted):
         some = ", ".join(map(repr, list(known)[:3]))
         _checks.refuse(argument, "name one or more", "empty", f"Write [{some}], or leave it out for all.")
     if not isinstance(wanted, str):
-        spelled = {goal: metrics_of_goal(metrics, channels, goal, white=white) for goal in GOALS}
+        spelled = {goal: metrics_of_goal(layout, goal, white=white) for goal in GOALS}
         lists = [(isinstance(one, str) and spelled.get(one)) or [one] for one in wanted]
         wanted = list(itertools.chain.from_iterable(lists))
     names = [m for m in wanted if not isinstance(m, Metric)] if not isinstance(wanted, str) else wanted
     current = iter(current_names(argument, names, known))
-    chosen = [
-        of_channel(m, channels, metrics, argument) if isinstance(m, Metric) else known[next(current)] for m in wanted
-    ]
+    chosen = [of_channel(m, layout, argument) if isinstance(m, Metric) else known[next(current)] for m in wanted]
     return _of_different_names(chosen, argument)
 
 
@@ -96,18 +87,19 @@ def _of_different_names(metrics: Sequence[Metric], argument: str) -> list[Metric
     return list(by_name.values())
 
 
-def of_channel(metric: Metric, channels: Mapping[str, Channel], metrics: Sequence[Metric], argument: str) -> Metric:
+def of_channel(metric: Metric, layout: Layout, argument: str) -> Metric:
     """The metric after a check of its channels, with the weighting of its channel instead of "default".
 
     Lift-off is counted as in the ride metrics, by whether the wheel can lift off.
     """
+    channels = layout.by_name
     for name in (metric.channel, metric.by) if metric.by else (metric.channel,):
         _checks.one_of(f"channel of {argument}", name, channels)
     own = channels[metric.channel].kind.weighting
     if metric.weighting is not None and own is None:
         remedy = f"Leave its `weighting` out; {metric.channel} is {channels[metric.channel].kind.meaning}."
         _checks.refuse(argument, "weight an acceleration, as ISO 2631-1 does", repr(metric.channel), remedy)
-    counts = {m.channel: m.statistic for m in metrics if m.statistic in LIFT_OFF_FRACTIONS}
+    counts = {m.channel: m.statistic for m in layout.metrics if m.statistic in LIFT_OFF_FRACTIONS}
     if metric.statistic in LIFT_OFF_FRACTIONS and metric.channel in counts:
         return dataclasses.replace(metric, statistic=counts[metric.channel])
     return metric.weighted_by(own) if metric.weighting == "default" else metric

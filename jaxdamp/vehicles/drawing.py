@@ -51,7 +51,8 @@ class Drawing:
         self._links = [self._ends(link.extension) for link in frame.links]
         wheels = [self._ends(wheel.point)[0] for wheel in frame.wheels]
         self._on_road = {end.body for end in wheels}
-        pairs = self._pairs()
+        known = zip(frame.links, self._links, strict=True)
+        pairs = [(link, ends[0], ends[1]) for link, ends in known if len(ends) == 2]
         upright = [(link, upper, lower) for link, upper, lower in pairs if self._above(upper, lower)]
         self.springs = [link for link, *_ in upright]
         self.bodies = [body for body in frame.bodies if self._levels[body.name] > 0]
@@ -63,11 +64,6 @@ class Drawing:
         }
         self.parts["points"] = [self._place(end) for end in self._drawn]
         self.heights = [Point(self._terms(end)) for end in self._drawn]
-
-    def _pairs(self) -> list[tuple[Link, _End, _End]]:
-        """The links between two bodies, with their upper and lower ends."""
-        known = zip(self.frame.links, self._links, strict=True)
-        return [(link, ends[0], ends[1]) for link, ends in known if len(ends) == 2]
 
     def _drawn_bodies(self) -> Contents:
         """The bodies by their corners, and beams that carry wheels by their points."""

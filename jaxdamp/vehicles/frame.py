@@ -19,7 +19,7 @@ from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers import AbstractDamper, AbstractStateless, AbstractWrapper, Sum, Traits
 from jaxdamp.parameters import nonnegative, positive, setting
 from jaxdamp.vehicles.parts import SPRUNG, Body, Element, Link, Place, Point, Wheel, matrix, prefixed
-from jaxdamp.vehicles.port_form import PortForm, Ports, sum_springs
+from jaxdamp.vehicles.port_form import PortForm, Ports
 
 
 _WIDTH = 0.01
@@ -190,22 +190,23 @@ class Frame(eqx.Module):
         return Frame(self.bodies, self.links, wheels, self.places)
 
     def port_form(self) -> PortForm:
-        """The matrices."""
+        """The matrices: of springs k with extensions R q − S z_r, K = Σ Rᵀ k R, K_r = Σ Rᵀ k S, K_g = Σ Sᵀ k S."""
         names, count = self.coordinates, len(self.links)
         rows = matrix([part.extension if isinstance(part, Link) else part.point for part in self._parts], names)
         on_road = np.eye(len(self._parts), len(self.wheels), -count)
         ports = [i for i, part in enumerate(self._parts) for _ in part.elements]
         ports += [count + i for i, wheel in enumerate(self.wheels) if wheel.lifts]
         masses: dict[str, Scalar] = reduce(or_, [body.masses for body in self.bodies])
-        return sum_springs(
-            jnp.diag(jnp.stack([masses[name] for name in names])),
-            rows,
-            jnp.asarray(on_road, dtype=rows.dtype),
-            jnp.stack([part.stiffness for part in self._parts]),
-            jnp.stack([part.damping for part in self._parts]),
-            rows[np.array(ports, dtype=int)],
-            jnp.asarray(on_road[ports], dtype=rows.dtype) if any(port >= count for port in ports) else None,
-        )
+        mass = jnp.diag(jnp.stack([masses[name] for name in names]))
+        road = jnp.asarray(on_road, dtype=rows.dtype)
+        rates = [jnp.stack([getattr(part, name) for part in self._parts]) for name in ("stiffness", "damping")]
+        chosen = rows[np.array(ports, dtype=int)]
+        chosen_road = jnp.asarray(on_road[ports], dtype=rows.dtype) if any(port >= count for port in ports) else None
+        springs, dashpots = (rows.T * rate[None, :] for rate in rates)
+        ground_springs, ground_dashpots = (road.T * rate[None, :] for rate in rates)
+        of_motion = mass, springs @ rows, dashpots @ rows
+        of_road = springs @ road, dashpots @ road, ground_springs @ road, ground_dashpots @ road
+        return PortForm(*of_motion, *of_road, chosen, chosen_road)
 
     def static_wheel_loads(self, form: PortForm | None = None) -> Float[Array, " wheels"]:
         """Load of each wheel at rest on level ground [N], in the order of the wheels.

@@ -261,38 +261,3 @@ class LinearMap(eqx.Module):
     def scalars(self) -> "LinearMap":
         """The same with rows of scalars instead of matrices."""
         return LinearMap(*map(rows, (self.motion, self.force, self.road, self.road_rate)))
-
-
-def sum_springs(
-    mass: Float[Array, "q q"],
-    links: Float[Array, "links q"],
-    road: Float[Array, "links wheels"],
-    stiffness: Float[Array, " links"],
-    damping: Float[Array, " links"],
-    ports: Float[Array, "ports q"],
-    port_road: Float[Array, "ports wheels"] | None = None,
-) -> PortForm:
-    """The form of springs and dashpots whose extensions are R q − S z_r: K = Σ Rᵀ k R, K_r = Σ Rᵀ k S, K_g = Σ Sᵀ k S.
-
-    Arguments:
-        mass: M.
-        links: R, a row for each spring and its parallel dashpot.
-        road: S.
-        stiffness: k [N/m].
-        damping: c [N s/m].
-        ports: rows of the elements.
-        port_road: S of the elements; None if none is at the road.
-    """
-    springs, dashpots = links.T * stiffness[None, :], links.T * damping[None, :]
-    ground_springs, ground_dashpots = road.T * stiffness[None, :], road.T * damping[None, :]
-    return PortForm(
-        mass,
-        springs @ links,
-        dashpots @ links,
-        springs @ road,
-        dashpots @ road,
-        ground_springs @ road,
-        ground_dashpots @ road,
-        ports,
-        port_road,
-    )

@@ -203,21 +203,18 @@ def _scales(law: AbstractDamper, count: int, curved: tuple[int, ...], fast: Scal
     return _each(of_one, law, count, jnp.broadcast_to(fast, (count,)))
 
 
-def _still(kind: _Kind) -> Spread:
-    """The first distribution: no correlations, no means."""
-    laws, variables = kind.scale.shape
-    pairs = variables * (variables - 1) // 2
-    return Spread(jnp.log(kind.scale), jnp.zeros((laws, pairs)), jnp.zeros((laws, variables)))
-
-
 def _first(system: System, kinds: Sequence[_Kind], owners: Sequence[int]) -> list[Spread]:
-    """Where the search begins: with the vehicle at rest."""
+    """Where the search begins: with the vehicle at rest and no correlations."""
     rest = rest_position(system, jnp.zeros(system.form.road_stiffness.shape[1]))
     rest = jnp.where(jnp.isfinite(rest), rest, 0.0)
     states = sum(kind.answers.shape[1] - 1 for kind in kinds for _ in kind.answers)
     place = jnp.concatenate([rest, jnp.zeros(rest.size + states)])
     means = motions_of(system, owners, states).state @ place
-    return [_still(kind)._replace(mean=means[_chosen(kind)] / kind.scale) for kind in kinds]
+    pairs = [len(kind.curved) * (len(kind.curved) - 1) // 2 for kind in kinds]
+    return [
+        Spread(jnp.log(kind.scale), jnp.zeros((len(kind.scale), count)), means[_chosen(kind)] / kind.scale)
+        for kind, count in zip(kinds, pairs, strict=True)
+    ]
 
 
 def _chosen(kind: _Kind) -> np.ndarray:
@@ -291,7 +288,7 @@ def _distributions(
 ) -> list[Spread]:
     """How the variables of each kind are distributed in the vehicle with linear laws."""
     linear = with_linear_laws(system, laws)
-    moved = motions_of(system, laws.ports, laws.constant.size - laws.count)
+    moved = motions_of(system, laws.ports, laws.constant.size - len(laws.ports))
     settled = -solve(linear.a, jnp.concatenate([linear.b, linear.constant[:, None]], axis=1))
     settled, rest = settled[:, :-1], settled[:, -1]
     static = moved.state @ settled + moved.road

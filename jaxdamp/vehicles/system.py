@@ -167,11 +167,6 @@ class LinearLaws(eqx.Module):
     slopes: Float[Array, "answers motions"]  # shape (laws + states, 2 laws + states)
     ports: tuple[int, ...] = eqx.field(static=True)  # the port of each law; several laws may share one
 
-    @property
-    def count(self) -> int:
-        """Number of laws."""
-        return len(self.ports)
-
 
 class StateSpaceOfVehicle(NamedTuple):
     """ẋ = A x + B z_r + E ż_r + a, channels C x + D z_r + F ż_r; x = (q, q̇, states of the laws)."""
@@ -208,7 +203,8 @@ def motions_of(system: System, ports: Sequence[int], states: int) -> Motions:
 
 def with_linear_laws(system: System, laws: LinearLaws) -> StateSpaceOfVehicle:
     """The equations of the vehicle with these laws in place of its own."""
-    count, states = laws.count, laws.constant.size - laws.count
+    count = len(laws.ports)
+    states = laws.constant.size - count
     moved = motions_of(system, laws.ports, states)
     of_state, of_road, of_rate = (laws.slopes @ part for part in moved)
     chosen = np.array(laws.ports, dtype=int)
