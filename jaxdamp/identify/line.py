@@ -13,6 +13,7 @@ from jaxdamp._status import Status
 from jaxdamp._tables import Column, Contents, Table, plain
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.identify.control_charts import AbstractChart, Cusum, Ewma, Shewhart, signals
+from jaxdamp.identify.dependence import OWN
 from jaxdamp.identify.many_result import ManyFits
 
 
@@ -65,19 +66,20 @@ class ControlCharts(AbstractResult):
         """The damper from which a shift probably dates that the last damper still shows; empty if it shows none.
 
         Of a cumulative sum, the damper after the last one at which the sum was zero; else the first of the signals
-        that have not ended.
+        that have not ended. Dampers without the number do not count, the last one neither.
 
         Arguments:
             quantity: name.
         """
         _checks.one_of("quantity", quantity, self.quantities)
-        place, starts = list(self.quantities).index(quantity), []
-        for chart, row in zip(self.charts, self.signals[quantity], strict=True):
+        scores, starts = self.scores[:, list(self.quantities).index(quantity)], []
+        there = np.flatnonzero(np.isfinite(scores))
+        for chart, row in zip(self.charts, self.signals[quantity][:, there], strict=True):
             if row.size and row[-1]:
-                high, low = chart.statistics(self.scores[:, place])
+                high, low = chart.statistics(scores[there])
                 rest = (high if row[-1] > 0 else low) == 0.0 if isinstance(chart, Cusum) else row != row[-1]
                 starts.append(int(np.flatnonzero(rest)[-1]) + 1 if rest.any() else 0)
-        return self.names[starts[-1]] if starts else ""
+        return self.names[there[starts[-1]]] if starts else ""
 
     @property
     def false_alarms(self) -> float:
@@ -176,7 +178,8 @@ def control_charts(
     """Control charts of the fitted numbers of a line: which dampers stand out, and which numbers drift since when.
 
     Dampers are charted in their order. The limits come from a baseline that was in control: its mean, and its standard
-    deviation as the mean moving range over 1.128. Numbers that a record does not determine are left out.
+    deviation as the mean moving range over 1.128. Numbers that a record does not determine are left out, and those that
+    the dampers share.
 
     Arguments:
         dampers: of `identify.fit_many`; or numbers of your own for each damper by name, such as forces at a velocity.
@@ -219,6 +222,8 @@ def control_charts(
         share[j] = np.mean(errors[some, j][known] ** 2) / deviation[j] ** 2
         alike[j] = np.corrcoef(there[:-1], there[1:])[0, 1]
     chosen = (Shewhart(), Ewma(), Cusum()) if charts is None else tuple(charts)
+    if not chosen:
+        _checks.refuse("charts", "hold one or more", "empty", "Leave it out for the three usual ones.")
     for i, chart in enumerate(chosen):
         _checks.instance(
             f"charts[{i}]", chart, AbstractChart, "be a chart", "Write `charts=[identify.Ewma(0.1, 2.8)]`."
@@ -227,13 +232,15 @@ def control_charts(
 
 
 def _fitted(many: ManyFits) -> tuple[dict[str, np.ndarray], np.ndarray, dict[str, str]]:
-    """The numbers that the records determine, standard errors and units."""
+    """The numbers that the records determine for each damper by itself, standard errors and units."""
     sure = np.isfinite(many.standard_errors)
+    if many.dependence is not None:
+        sure &= many.dependence.degree == OWN
     sure &= np.array([status is not Status.LEFT_OUT for status in many.status])[:, None]
     values = np.where(sure, many.values, np.nan)
     moving = [j for j in range(values.shape[1]) if np.any(sure[:, j])]
     if not moving:
-        _checks.refuse("dampers", "hold a number that the records of some determine", many.summary)
+        _checks.refuse("dampers", "hold a number of each damper's own that the records of some determine", many.summary)
     names = [many.parameters[j] for j in moving]
     units = dict(zip(names, (many.free.owners[j].unit for j in moving), strict=True))
     return {name: values[:, j] for name, j in zip(names, moving, strict=True)}, many.standard_errors[:, moving], units

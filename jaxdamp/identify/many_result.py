@@ -14,7 +14,7 @@ from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._status import Status
 from jaxdamp._tables import Cell, Column, Contents, Shown, Table, plain, with_unit
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import AbstractDamper, Scheduled, with_fitted_range
+from jaxdamp.dampers import AbstractDamper, Scheduled, keeps_conditions, with_fitted_range
 from jaxdamp.identify.covered import covered_range, joined_range
 from jaxdamp.identify.criteria import against_priors, priors_on
 from jaxdamp.identify.dependence import OWN, Dependence
@@ -37,6 +37,7 @@ LEAST_SPREAD = 0.02  # of the median: numbers that differ by less do not make a 
 NOT_COUNTED = 0.02  # share of samples with little weight, above that of the others, from which it is named
 ONE_RECORD = 1.5  # times the RMSE of the other records, from which one is named as the cause
 CERTAIN = 4.0  # standard errors by which it must differ as well
+ROUNDING = 1e-9  # of a number, by which it may be beyond a limit
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -149,7 +150,8 @@ class ManyFits(AbstractResult):
                 a meaning.
 
         Raises:
-            ValueError: no settings were given, or the setting is outside them; an unknown blend.
+            ValueError: no settings were given, or the setting is outside them; a polynomial beyond the limits of
+                its parameter; an unknown blend.
         """
         if blend is not None:
             _checks.one_of("blend", blend, ("parameters", "force"))
@@ -188,7 +190,15 @@ class ManyFits(AbstractResult):
             with_own = np.where(np.isnan(y), Coordinates(self.free, smooth="ordered").start, y)
             shared = np.asarray(Coordinates(self.free, smooth="ordered").to_physical(jnp.asarray(with_own)))
             values = np.where(np.isnan(y), values, shared)
-        return law_of(self.free.started_at(values).tree)
+        remedy = "Share with lower degrees, over more settings, or not at all."
+        for name, value, low, high in zip(self.free.names, values, *self.free.limits(), strict=True):
+            if not low - ROUNDING * abs(value) <= value <= high + ROUNDING * abs(value):
+                must = f"be one at which {name} is within {low:g} to {high:g}"
+                _checks.refuse("setting", must, f"{setting:g}, where its polynomial gives {value:.4g}", remedy)
+        tree = self.free.started_at(values).tree
+        if not keeps_conditions(tree):
+            _checks.refuse("setting", "be one at which the law keeps its conditions", setting, remedy)
+        return law_of(tree)
 
     @functools.cached_property
     def remarks(self) -> tuple[str, ...]:

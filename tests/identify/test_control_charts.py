@@ -114,6 +114,15 @@ def test_an_infinite_number_is_a_missing_one_and_the_baseline_any_whole_number()
     assert not signals(Cusum(), infinite[:80])[65:].any()
 
 
+@pytest.mark.parametrize("missing", [25, 29])
+def test_a_shift_lasts_beside_a_damper_without_the_number(missing):
+    force = 100.0 + np.random.default_rng(1).standard_normal(30)
+    force[20:] += 4.0
+    force[missing] = np.nan
+    assert control_charts({"force": force}, baseline=20).since("force") == "21"
+    assert control_charts({"force": force}, baseline=20, charts=[Ewma()]).since("force") == "22"
+
+
 def test_labels_that_repeat_outside_the_baseline_do_no_harm():
     force = np.random.default_rng(3).standard_normal(30)
     found = control_charts({"force": force}, baseline=NAMES[9:19], names=[*NAMES[:28], "3", "4"])
@@ -132,6 +141,7 @@ def test_what_cannot_be_charted_is_refused():
         ({"a": force}, NAMES[:10], {"names": [*NAMES[:28], "3", "4"]}, "is '3', of numbers 3, 29. Give labels that"),
         ({"a": force * 0.0}, 10, {}, "8 or more dampers that determine 'a' and are not all alike"),
         ({"a": force}, 10, {"names": ["a"]}, "`names` must be one for each of 30 dampers"),
+        ({"a": force}, 10, {"charts": []}, "`charts` must hold one or more"),
         ({"a": force}, 10, {"charts": ["EWMA"]}, r"`charts\[0\]` must be a chart"),
     ]
     for dampers, baseline, options, message in cases:

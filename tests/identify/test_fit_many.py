@@ -11,7 +11,7 @@ import pytest
 from jaxdamp import identify
 from jaxdamp.bench import BenchRun, SineTest, VirtualDyno
 from jaxdamp.dampers import AbstractDamper, Bilinear, Lag, Linear, Scheduled, with_command
-from jaxdamp.identify import Status, fit, fit_many
+from jaxdamp.identify import Status, control_charts, fit, fit_many
 from jaxdamp.identify.rows import Row
 from jaxdamp.identify.traces import _grouped
 from jaxdamp.parameters import free_parameters, get
@@ -162,6 +162,21 @@ def test_shared_parameters_follow_the_setting(clicks):
     assert isinstance(unsure.law_at(3.0), Scheduled) and isinstance(unsure.law_at(2.0), Bilinear)
     with pytest.raises(ValueError, match="`setting` must be from 0 to 10"):
         many.law_at(11.0)
+
+
+def test_a_polynomial_gives_no_law_beyond_its_limits():
+    """Through 800, 300 and 200 N s/m at 4, 8 and 16 clicks the fourth degree gives -458 N s/m at 13."""
+    settings, rates = [0, 2, 4, 8, 16], [5000.0, 2000.0, 800.0, 300.0, 200.0]
+    test = SineTest(0.02, 1.0)
+    runs = [VirtualDyno(Bilinear(r, 900.0), force_noise=1.0, seed=i).run([test])[0] for i, r in enumerate(rates)]
+    shared = {"rebound_rate": 4, "compression_rate": 0}
+    for bounds, least in (({}, "0"), ({"rebound_rate": (150.0, 6000.0)}, "150")):
+        many = fit_many(Bilinear, runs, shared=shared, settings=settings, bounds=bounds)
+        assert float(get(many.law_at(8.0), "rebound_rate")) == pytest.approx(300.0, abs=2.0)
+        with pytest.raises(ValueError, match=rf"within {least} to .* is 13, where its poly.* -4.*lower degree"):
+            many.law_at(13.0)
+    with pytest.raises(ValueError, match="a number of each damper's own"):
+        control_charts(fit_many(Bilinear, runs, shared=["rebound_rate", "compression_rate"]), 8)
 
 
 def test_a_bad_run_stands_out(clicks):
