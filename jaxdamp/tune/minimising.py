@@ -23,7 +23,7 @@ from jaxdamp.tune.objective import Function, check_objective
 from jaxdamp.tune.ranges import start_points
 from jaxdamp.tune.rescoring import Rescore, driver, other_roads, rescored
 from jaxdamp.tune.result import Attempt, Drive, ScenarioValues, TuneResult, V
-from jaxdamp.tune.scenario_ride import ScenarioRide
+from jaxdamp.tune.scenario_ride import ScenarioRide, risen_notes
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import DEFAULTS, Settings
 from jaxdamp.tune.task import DesignTask, Evaluator, check_call, is_white
@@ -224,6 +224,8 @@ def _result(
     tuned = space.free.build(jnp.asarray(ended.values, space.free.values.dtype))
     runs, extrapolated = task.notes_on_runs(tuned)
     each, reported = _in_scenarios(task, tuned, before, after)
+    sides = ((before, after), reported)  # by the risk of the search, and by the true one
+    notes += risen_notes(objective.name, *((side[0][objective.name], side[1][objective.name]) for side in sides))
     road = task.road.scenarios[0].road if isinstance(task.road, Scenarios) else task.road
     return TuneResult(
         vehicle=tuned,

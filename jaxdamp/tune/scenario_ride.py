@@ -61,6 +61,14 @@ def smooth_in_scenarios(ride: "Ride | ScenarioRide") -> bool:
     return isinstance(ride, ScenarioRide) and exact(ride.risk) is not ride.risk
 
 
+def risen_notes(name: str, smooth: tuple[float, float], true: tuple[float, float]) -> list[str]:
+    """A sentence where a metric fell by the smooth risk of a search, but rose by the true one; before and after."""
+    if not (smooth[1] < smooth[0] and true[1] > true[0]):
+        return []
+    words = "The search followed a smooth maximum over the scenarios, which fell"
+    return [f"{words}: the true largest {name} rose from {true[0]:.4g} to {true[1]:.4g}."]
+
+
 @final
 @dataclasses.dataclass(frozen=True)
 class CVaR:
