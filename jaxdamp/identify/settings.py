@@ -146,8 +146,8 @@ class VehicleSettings(Free, Search, total=False):
             in fractions of it. Between the samples the road is a smooth curve through the measured heights.
         samples_per_cycle: of bench records, as in `Records`.
         starts: number of searches, the first from `vehicle`, the others from parameters up to twice and half of those
-            that it ends at, with the noise that it finds. The first one counts unless another one fits better; `minima`
-            describes the others.
+            that it ends at, or at random where one is zero, with the noise that it finds. The first one counts unless
+            another one fits better; `minima` describes the others.
         seed: of the other starts.
         solver: as in `FitSettings`.
     """
@@ -164,8 +164,8 @@ class TargetSettings(Free, Search, total=False):
     """The keywords that `fit_targets` has from `fit`: those of `Free` and `Search`, and these.
 
     Arguments:
-        starts: number of searches, the first from `start`, the others from parameters up to twice and half of it. The
-            first one counts unless another one meets the targets better.
+        starts: number of searches, the first from `start`, the others from parameters up to twice and half of it, or at
+            random where it is zero. The first one counts unless another one meets the targets better.
         seed: of the other starts.
         solver: as in `FitSettings`.
     """

@@ -160,14 +160,24 @@ def _not_among(tried: Sequence[np.ndarray], others: Sequence[np.ndarray]) -> lis
     return [values for values in others if not any(np.array_equal(values, one) for one in tried)]
 
 
-def scattered_starts(free: FreeParameters, count: int, seed: int) -> list[Float[np.ndarray, " free"]]:
-    """The start, then others: each parameter times a factor between a half and two, where that is within its limits."""
-    random, (lower, upper) = np.random.default_rng(seed), free.limits()
-    values = np.asarray(free.values, float)
-    starts = [values]
-    for _ in range(count - 1):
+def scattered_starts(problem: Problem, first: SearchEnd, count: int, seed: int) -> list[Float[np.ndarray, " free"]]:
+    """Starts beside that of the problem: each parameter times a factor between a half and two, where limits allow it.
+
+    No factor moves a number from zero, where functions of several numbers are often symmetric: one is drawn at random,
+    as large as changes the residuals by the size of the data, by the derivatives at the end of the first search.
+    """
+    random, free = np.random.default_rng(seed), problem.free
+    values, (lower, upper) = np.asarray(free.values, float), free.limits()
+    sensitivity = np.linalg.norm(first.jacobian, axis=0)
+    units = np.concatenate([np.ravel(np.asarray(unit, float)) for unit in problem.coordinates.units])
+    size = np.divide(problem.level, sensitivity, out=units, where=np.isfinite(sensitivity) & (sensitivity > 0))
+    zero = (values == 0) & ~problem.coordinates.ordered
+    low, high = np.maximum(lower, -size)[zero], np.minimum(upper, size)[zero]
+    starts = []
+    for _ in range(count):
         factors = [np.full(p.value.size, 2.0 ** random.uniform(-1.0, 1.0)) for p in free.chosen]
         moved = values * np.concatenate(factors)
+        moved[zero] = random.uniform(low, high)
         starts.append(np.where((moved > lower) & (moved < upper), moved, values))
     return starts
 
@@ -176,12 +186,13 @@ def search_scattered(
     problem: Problem, starts: int | None, *, seed: int, max_steps: int, solver: Solver | None = None
 ) -> Solution:
     """Search from scattered starts to their ends; the first of those that count as equally good is the best."""
-    tried = scattered_starts(problem.free, starts or 1, seed)
-    allowed = [v for i, v in enumerate(tried) if i == 0 or keeps_conditions(problem.free.started_at(v).tree)]
-    ends = [search(problem.started_at(values), max_steps, solver=solver) for values in allowed]
+    ends = [search(problem, max_steps, solver=solver)]
+    for values in scattered_starts(problem, ends[0], (starts or 1) - 1, seed):
+        if keeps_conditions((moved := problem.started_at(values)).free.tree):
+            ends.append(search(moved, max_steps, solver=solver))
     squares = np.array([end.squares if end.finite else np.inf for end in ends])
     best = ends[int(np.argmax(squares <= squares.min() + equally_good(squares.min())))]
-    return Solution(best, tuple(end for end in ends if end.finite and (end.converged or end is best)), len(allowed))
+    return Solution(best, tuple(end for end in ends if end.finite and (end.converged or end is best)), len(ends))
 
 
 def equally_good(squares: float) -> float:
