@@ -13,7 +13,7 @@ from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Table
 from jaxdamp.dampers import margins
-from jaxdamp.identify.propagation import Evidence, Propagated, over_samples
+from jaxdamp.identify.propagation import Evidence, Propagated, numbers_of, over_samples
 from jaxdamp.parameters import Coordinates
 
 
@@ -70,8 +70,7 @@ class Posterior(AbstractResult):
 
     def propagate(self, function: Callable[[PyTree], PyTree]) -> Propagated:
         """A function of the law over the samples, as `FitResult.propagate`."""
-        model = self.evidence.model
-        return over_samples(lambda values: jnp.asarray(function(model(values)), float), jnp.asarray(self.samples))
+        return over_samples(numbers_of(function, self.evidence.model), jnp.asarray(self.samples))
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import equinox as eqx
@@ -27,6 +27,7 @@ from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.rows import on_device
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.traces import Batch
+from jaxdamp.parameters import FreeParameters
 from jaxdamp.rig import march, quasi_static
 
 
@@ -75,11 +76,14 @@ class Evidence(NamedTuple):
         half = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))  # a root of the covariance of any rank
         lower, upper = free.limits()
         limited = any(law.has_conditions() for _, law in laws_inside(free.tree))
+        ordered = [i for i, p in enumerate(free.chosen) if p.domain.ordered]
         drawn: list[np.ndarray] = []
         for _ in range(MOST_DRAWS):
             spread = np.sqrt(rng.chisquare(dof, (count, 1)) / dof) if np.isfinite(dof) else 1.0
             values = self.minimum.values + rng.standard_normal((count, len(half))) @ half.T / spread
             inside = values[np.all((values >= lower) & (values <= upper), axis=1)]
+            if ordered:
+                inside = [v for v in inside if _in_order(free, ordered, v)]
             drawn += [v for v in inside if not limited or keeps_conditions(free.started_at(v).tree)]
             if len(drawn) >= count:
                 return np.stack(drawn[:count])
@@ -87,49 +91,78 @@ class Evidence(NamedTuple):
         _checks.refuse("samples", "be drawn within the domains of the parameters", value, remedy)
 
 
+def _in_order(free: FreeParameters, ordered: Sequence[int], values: Float[np.ndarray, " free"]) -> bool:
+    """Whether each of the ordered vectors among the chosen parameters is in its order."""
+    pieces = free.split(values)
+    return all(free.chosen[i].domain.contains(pieces[i]) for i in ordered)
+
+
 class Propagated(NamedTuple):
-    """A function of the fitted law, with its uncertainty; all arrays have the shape of the function's value.
+    """A function of the fitted law, with its uncertainty; each field has the structure of the function's value.
 
     Attributes:
         value: at the fitted values.
         standard_error: from the derivatives by the parameters, or the standard deviation of the samples.
         lower: lower end of the 95 % interval, of Student's t or between the samples.
         upper: upper end.
-        samples: the function of every sample, shape (samples, ...), if samples were drawn.
+        samples: the function of every sample, arrays of shape (samples, ...), if samples were drawn.
     """
 
-    value: Float[np.ndarray, "..."]
-    standard_error: Float[np.ndarray, "..."]
-    lower: Float[np.ndarray, "..."]
-    upper: Float[np.ndarray, "..."]
-    samples: Float[np.ndarray, "samples ..."] | None = None
+    value: PyTree
+    standard_error: PyTree
+    lower: PyTree
+    upper: PyTree
+    samples: PyTree | None = None
 
 
 def propagate(
     evidence: Evidence, function: Callable[[PyTree], PyTree], samples: int | None = None, seed: int = 0
 ) -> Propagated:
     """`FitResult.propagate`."""
-
-    def of(values: Array) -> Array:
-        return jnp.asarray(function(evidence.model(values)), float)
-
+    of = numbers_of(function, evidence.model)
     centre = jnp.asarray(evidence.minimum.values, evidence.problem.free.values.dtype)
     if samples is not None:
         if samples < 2:
             _checks.refuse("samples", "be 2 or more", samples)
-        value = np.asarray(compiled_for_loops(of)(centre), float)
+        value = _on_host(compiled_for_loops(of)(centre))
         return over_samples(of, jnp.asarray(evidence.draws(samples, seed), centre.dtype), value)
 
-    value, slopes = (np.asarray(a, float) for a in compiled_for_loops(with_jacobian(of))(centre))
-    error = np.asarray(standard_error(slopes, evidence.covariance))
-    return Propagated(value, error, value - evidence.quantile * error, value + evidence.quantile * error)
+    value, slopes = _on_host(compiled_for_loops(with_jacobian(of))(centre))
+    error = jax.tree.map(lambda slope: np.asarray(standard_error(slope, evidence.covariance)), slopes)
+    lower = jax.tree.map(lambda v, e: v - evidence.quantile * e, value, error)
+    upper = jax.tree.map(lambda v, e: v + evidence.quantile * e, value, error)
+    return Propagated(value, error, lower, upper)
 
 
-def over_samples(of: Callable[[Array], Array], samples: Array, value: np.ndarray | None = None) -> Propagated:
+def numbers_of(function: Callable[[PyTree], PyTree], model: Callable[[Array], PyTree]) -> Callable[[Array], PyTree]:
+    """A user's function of a model as one of its free numbers, which returns arrays in the user's structure."""
+
+    def of(values: Array) -> PyTree:
+        result = function(model(values))
+        leaves = jax.tree.leaves(result)
+        if not leaves or not all(eqx.is_array_like(leaf) and not jnp.iscomplexobj(leaf) for leaf in leaves):
+            remedy = "Return a number, an array, or a dict or other pytree of them."
+            _checks.refuse("function", "return real numbers", _checks.described(result), remedy)
+        return jax.tree.map(lambda leaf: jnp.asarray(leaf, float), result)
+
+    return of
+
+
+def over_samples(of: Callable[[Array], PyTree], samples: Array, value: PyTree | None = None) -> Propagated:
     """A function over samples of the free numbers, with its value or its mean."""
-    drawn = np.asarray(eqx.filter_jit(jax.vmap(of))(samples), float)
-    lower, upper = np.quantile(drawn, [0.025, 0.975], axis=0)
-    return Propagated(drawn.mean(axis=0) if value is None else value, drawn.std(axis=0, ddof=1), lower, upper, drawn)
+    drawn = _on_host(eqx.filter_jit(jax.vmap(of))(samples))
+
+    def of_samples(statistic: Callable[[np.ndarray], np.ndarray]) -> PyTree:
+        return jax.tree.map(lambda a: np.asarray(statistic(a)), drawn)
+
+    error = of_samples(lambda a: a.std(axis=0, ddof=1))
+    lower, upper = (of_samples(functools.partial(np.quantile, q=q, axis=0)) for q in (0.025, 0.975))
+    value = of_samples(lambda a: a.mean(axis=0)) if value is None else value
+    return Propagated(value, error, lower, upper, drawn)
+
+
+def _on_host(tree: PyTree) -> PyTree:
+    return jax.tree.map(lambda leaf: np.asarray(leaf, float), tree)
 
 
 def standard_error(slopes: Float[np.ndarray, "... free"], covariance: Float[np.ndarray, "free free"]) -> np.ndarray:

@@ -68,13 +68,16 @@ class Fit(AbstractResult):
         """The uncertainty of any function of the fitted law, vehicle or model: a force, a table, a metric of a ride.
 
         Arguments:
-            function: of it, such as `lambda law: law.force_velocity(0.5)`; computed by JAX, of any shape.
-            samples: number of models drawn from the uncertainty of the parameters, for functions that are not straight
-                within it; derivatives are used if it is left out.
+            function: of it, such as `lambda law: law.force_velocity(0.5)`; computed by JAX, it returns
+                a number, an array, or a dict or other pytree of them.
+            samples: number of models drawn from the uncertainty of the parameters within their domains, for functions
+                that are not straight within it. If it is left out, the derivatives at the fit are used, which know no
+                domain: the interval of a mass of 1 ± 2 kg then begins below zero.
             seed: of the samples.
 
         Returns:
-            Value, standard error, and lower and upper end of the 95 % interval.
+            Value, standard error, and lower and upper end of the 95 % interval, each in the structure that the function
+            returns.
         """
         return propagate(self._evidence, function, samples, seed)
 

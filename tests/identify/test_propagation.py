@@ -12,9 +12,10 @@ from scipy.signal import lfilter
 
 from jaxdamp import Ride, plots, roads, vehicles
 from jaxdamp.bench import SineTest, VirtualDyno
-from jaxdamp.dampers import Besinger, Bilinear, Linear, Saturating, SeriesSpring, Table
+from jaxdamp.dampers import Besinger, Bilinear, Linear, PiecewiseLinear, Saturating, SeriesSpring, Table
 from jaxdamp.dampers.besinger import least_rebound
 from jaxdamp.identify import FitResult, fit, fit_targets, propagation
+from jaxdamp.parameters import free_parameters
 from jaxdamp.rig import Rig
 
 
@@ -57,6 +58,32 @@ def test_any_function_by_derivatives_and_by_samples(bilinear):
     )
     with pytest.raises(ValueError, match="`samples` must be 2 or more"):
         bilinear.propagate(ratio, samples=1)
+
+
+@pytest.mark.parametrize("samples", [None, 50])
+def test_results_have_the_structure_that_the_function_returns(bilinear, samples):
+    def both(law):
+        return {"rates": (law.rebound_rate, law.compression_rate), "law": law, "curve": law.rebound_rate * jnp.ones(3)}
+
+    found = bilinear.propagate(both, samples=samples)
+    error = found.standard_error
+    assert error["rates"][0] == error["law"].rebound_rate > 0 and error["curve"].shape == (3,)
+    assert np.all(found.lower["curve"] < found.value["curve"]) and found.upper["rates"][1] > found.value["rates"][1]
+    assert samples is None or found.samples["curve"].shape == (50, 3)
+    for wrong in (lambda law: {"words": "none", "rate": law.rebound_rate}, lambda law: None):
+        with pytest.raises(ValueError, match="`function` must return real numbers"):
+            bilinear.propagate(wrong, samples=samples)
+
+
+def test_samples_of_knots_are_in_their_order(bilinear):
+    """Of the normal distribution, six in ten are not."""
+    law = PiecewiseLinear(np.array([-0.05, -0.02, 0.02, 0.05]), np.array([800.0, 2500.0, 4000.0, 1500.0, 900.0]))
+    free = free_parameters(law, over=["knots"])
+    problem = bilinear._evidence.problem._replace(free=free)
+    minimum = bilinear._evidence.minimum._replace(values=np.asarray(free.values, float))
+    evidence = bilinear._evidence._replace(problem=problem, minimum=minimum, covariance=0.03**2 * np.eye(4))
+    drawn = np.asarray(propagation.propagate(evidence, lambda law: law.knots, samples=200).samples)
+    assert drawn.shape == (200, 4) and np.all(np.diff(drawn, axis=1) > 0)
 
 
 @pytest.mark.slow
