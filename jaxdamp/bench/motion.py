@@ -1,5 +1,7 @@
 """What kind of motion a stroke is: its frequency, its cycles, its amplitude, where its velocity is largest."""
 
+import math
+
 import numpy as np
 from jaxtyping import Bool, Float
 
@@ -144,14 +146,15 @@ def moving_span(time: Samples, stroke: Samples, frequency: float) -> tuple[int, 
     return rest(stroke), len(stroke) - 1 - rest(stroke[::-1])
 
 
-def white_noise(values: Samples) -> float:
-    """Standard deviation of the white noise in a channel, from its third differences; the median leaves out jumps.
+def white_noise(values: Samples, order: int = 3) -> float:
+    """Standard deviation of the white noise in a channel, from its differences; the median leaves out jumps.
 
     Arguments:
         values: samples of the channel, in its unit.
+        order: of the differences; higher ones see less of a motion with few samples in a cycle.
     """
-    differences = np.diff(values, 3)
-    return float(np.median(np.abs(differences)) / (0.6745 * np.sqrt(20.0)))
+    differences = np.diff(values, order)
+    return float(np.median(np.abs(differences)) / (0.6745 * np.sqrt(math.comb(2 * order, order))))
 
 
 def savitzky_golay_weights(half: int, order: int, derivative: int) -> Float[np.ndarray, "samples columns"]:

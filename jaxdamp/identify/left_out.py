@@ -7,7 +7,8 @@ What tells causes apart:
 
 - a delay shifts all frequencies by one time, a filter the high ones less, the memory of a damper each record and
   direction by another;
-- the mains have a line, a clock that jitters scatters the force in proportion to its rate of change;
+- the mains have a line, a clock that jitters scatters the force in proportion to its rate of change, and noise of the
+  velocity makes the predicted force noisy;
 - no law of the velocity has a force at rest, so that another curve with one is a constant force;
 - a fault of the machine explains all that repeats from cycle to cycle: if some of it is left, it is the law. A spring
   in series is nearly a filter and a mass: the second of two such effects has to explain all that the first left.
@@ -19,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxdamp._triangles import unit_columns
-from jaxdamp.bench import clock_jitter, mains_lines
+from jaxdamp.bench import clock_jitter, mains_lines, white_noise
 from jaxdamp.identify.model import is_memoryless
 from jaxdamp.identify.noise import correlation_time
 from jaxdamp.identify.problem import Problem
@@ -48,7 +49,8 @@ PENALTY = 2.0  # deviance for each further number of an effect, in logarithms of
 OF_THE_LAW = 0.01  # of what repeats from cycle to cycle, above which effects of a machine do not explain it
 OF_PHASE = ("delay", "lag", "mass")  # effects that shift the phase, as memory of a damper does
 SURE = 5.0  # standard errors from which something repeats
-SCATTER = 0.2  # share of the squared residual by a clock that jitters, from which it is named
+SCATTER = 0.2  # share of the squared residual by a clock that jitters or a noisy velocity, from which it is named
+FINE = 5  # order of the differences that show the noise of the velocity also where samples are few
 STATIC = 0.5  # force at rest, relative to its RMS, from which another curve is a constant force
 OF_ITS_OWN = 1e-5  # share of a pattern that no fitted number has, below which it cannot be shown
 REFINED = 4  # times that the size of a delay or a lag is refined
@@ -77,7 +79,7 @@ def left_out(problem: Problem, best: SearchEnd) -> list[str]:
     """A sentence on each effect that the residual shows, or one on the law where no effect of a machine explains it.
 
     Offset, gas spring, mass, friction, delay, low-pass filter, heat, zero that drifts, gain of a record, clearance;
-    curve and memory of the damper; the mains, a clock that jitters.
+    curve and memory of the damper; the mains, a clock that jitters, a noisy velocity.
     """
     used = problem.used
     if problem.is_rounding(best.squares) or np.count_nonzero(used) <= 2 * best.values.size:
@@ -89,8 +91,8 @@ def left_out(problem: Problem, best: SearchEnd) -> list[str]:
         return []
     squares, repeated = float(residual @ residual), _repeated(residual, records)
     of_mains, residual, span = _mains(problem, records, residual, span)
-    of_clock = _jitter(problem, records, squares)
-    named = _search(problem, records, residual, span, squares, SCATTER if of_clock else 0.0)
+    scatter, least = _scatter(problem, records, squares)
+    named = _search(problem, records, residual, span, squares, least)
     asked = _to_explain(named, repeated, records)
     if named:
         residual = named[-1].rest
@@ -101,9 +103,9 @@ def left_out(problem: Problem, best: SearchEnd) -> list[str]:
         not static and repeated > 0 and left > max(OF_THE_LAW * asked, sure)
     ):
         of_law = _of_the_law(named, left / repeated if repeated > 0 else 1.0, is_memoryless(problem.law))
-        return [*of_clock, of_law, *of_mains]
+        return [*scatter, of_law, *of_mains]
     looks = ((one.words.format("of the squared residual look"), one.effect.remedy) for one in named)
-    return [*of_clock, *(f"{look}, which the fit leaves out: {remedy}." for look, remedy in looks), *of_mains]
+    return [*scatter, *(f"{look}, which the fit leaves out: {remedy}." for look, remedy in looks), *of_mains]
 
 
 def _to_explain(named: Sequence[_Named], repeated: float, records: Sequence[Record]) -> float:
@@ -284,3 +286,22 @@ def _jitter(problem: Problem, records: Sequence[Record], squares: float) -> list
         f"About {100 * share:.0f} % of the squared residual come from a clock that jitters by {1e3 * largest:.2g} ms:"
         " take the clock of the hardware, not of the computer."
     ] * (share >= SCATTER)
+
+
+def _scatter(problem: Problem, records: Sequence[Record], squares: float) -> tuple[list[str], float]:
+    """A sentence on a jittering clock or a noisy velocity, and the share from which effects are named beside it.
+
+    The predicted force has the noise of the velocity too, of which effects can explain a part.
+    """
+    if of_clock := _jitter(problem, records, squares):
+        return of_clock, SCATTER
+    total = sum(float(np.sum((weight * white_noise(m.force, FINE)) ** 2)) for _, _, weight, m, _ in records)
+    if (share := min(total / squares, 1.0)) < SCATTER:
+        return [], share
+    largest = max(white_noise(problem.runs[record.number].velocity, FINE) for record in records)
+    sentence = (
+        f"At least {100 * share:.0f} % of the squared residual come from noise of the velocity, up to {largest:.2g}"
+        " m/s, which makes the fitted damping too small: average more samples (a smaller `samples_per_cycle`), or leave"
+        " the channel out, so that the velocity is derived from the stroke."
+    )
+    return [sentence], SCATTER

@@ -9,12 +9,13 @@ import numpy as np
 from jaxtyping import Array, Bool
 
 from jaxdamp import _checks
-from jaxdamp.bench import BenchRun
+from jaxdamp.bench import BenchRun, white_noise
 from jaxdamp.identify.initial_states import Cycle, moving_samples, repeated_motion, start_of
 from jaxdamp.identify.model import Model, blind_end
 
 
 LARGEST_TURN = 0.1  # of the peak velocity, by which it may change within an averaged block
+LARGEST_NOISE = 5.0  # standard deviations: of the noise, in the block that it changes most
 COARSEST = 0.48  # rad between samples, beyond which straight lines between them are the larger error
 LAG_ANGLE = 0.02  # rad, largest step of a filter of the force, whose law bends between samples where a valve opens
 
@@ -86,14 +87,18 @@ def samples_in_block(run: BenchRun, samples_per_cycle: int | None) -> int:
     """How many samples of a record are averaged; none where the command varies, which is faster than the motion.
 
     Fewer where the velocity turns within a block, as at the ends of a triangle: a mean force is not that of a mean
-    velocity there.
+    velocity there. A block turns by what the means of its halves differ by, as along a straight line from its first
+    sample to its last, beyond the noise of the velocity, which averaging makes smaller.
     """
     if run.command_channel is not None or samples_per_cycle is None:
         return 1
     block = max(int(2 * np.pi * run.sampling_rate / dominant_rate(run) / samples_per_cycle), 1)
+    noise = white_noise(run.velocity) if block > 1 else 0.0
     while block > 1:
-        within = run.velocity[: len(run) // block * block].reshape(-1, block)
-        if np.ptp(within, axis=1).max() <= LARGEST_TURN * run.peak_velocity:
+        within, half = run.velocity[: len(run) // block * block].reshape(-1, block), block // 2
+        differences = np.abs(within[:, -half:].mean(axis=1) - within[:, :half].mean(axis=1))
+        beyond = differences.max() - LARGEST_NOISE * noise * np.sqrt(2.0 / half)
+        if beyond * (block - 1) / (block - half) <= LARGEST_TURN * run.peak_velocity:
             break
         block //= 2
     return block

@@ -1,5 +1,7 @@
 """Warnings of a fit name the true cause of its residual, or the law, and never advise what makes the fit worse."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -85,6 +87,19 @@ def test_a_filter_of_a_valve_that_opens_between_samples_is_followed():
 def test_a_clock_that_jitters_is_no_clearance():
     cause, said = first_cause("jitter", 0)
     assert cause == "jitter" and not any("clearance" in text for text in said.texts), said.texts
+
+
+def test_a_noisy_velocity_is_no_clearance_and_is_averaged():
+    """At every reversal its sign changes many times, which looked like a clearance that takes the force away."""
+    tests, rng = [bench.SineTest(0.02, f, cycles=4) for f in (1.0, 2.0, 4.0)], np.random.default_rng(0)
+    runs = bench.VirtualDyno(dampers.Bilinear(2600.0, 1200.0), force_noise=20.0).run(tests)
+    noise = [0.1 * run.peak_velocity * rng.standard_normal(len(run)) for run in runs]
+    noisy = [dataclasses.replace(run, velocity=run.velocity + n) for run, n in zip(runs, noise, strict=True)]
+    all_samples, few = (identify.fit(dampers.Bilinear(2000.0, 2000.0), noisy, samples_per_cycle=n) for n in (None, 50))
+    for result in (all_samples, few):
+        (said,) = result.warnings
+        assert "noise of the velocity, up to 0.05" in said
+    assert all_samples["rebound_rate"].value < 2560.0 < few["rebound_rate"].value
 
 
 @pytest.mark.slow

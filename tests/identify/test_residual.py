@@ -131,3 +131,6 @@ def test_samples_are_not_averaged_over_the_turns_of_a_triangle():
     triangle = BenchRun("triangle", t, 0.0127 * np.arcsin(inner), velocity, 2000.0 * velocity)
     sine = BenchRun("sine", t, 0.02 * np.sin(2 * np.pi * t), 0.04 * np.pi * np.cos(2 * np.pi * t), velocity)
     assert samples_in_block(triangle, 200) < samples_in_block(sine, 200)
+    noise = 0.01 * np.random.default_rng(0).standard_normal(t.size)  # m/s, 8 and 12 % of the velocities
+    noisy = [dataclasses.replace(run, velocity=run.velocity + noise) for run in (triangle, sine)]
+    assert samples_in_block(noisy[0], 50) < 15 < samples_in_block(noisy[1], 50)  # of 20; the noise made it 1
