@@ -75,6 +75,8 @@ def add_tuning(
     report.points([*result.active, *result.warnings])
     if result.scenarios is not None:
         report.table(result.scenario_table())
+    if result.tolerances:
+        report.table(result.tolerance_table())
     rescored = result.fresh if rescored is None else rescored
     if rescored is not None:
         report.table(rescored.table())

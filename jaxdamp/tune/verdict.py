@@ -100,6 +100,8 @@ def verdict_of(result: "TuneResult[AbstractVehicle]") -> Verdict:
     lost = [f"{name} is {percentage(100 * x)[1:]} beyond its limit" for name, x in over.items()]
     if lost:
         outcome, first, held = Outcome.LIMIT_LOST, f"Not better: {'; '.join(lost)}; {words}", ""
+    elif _is_none(gain, error):
+        outcome, first = Outcome.NOT_BETTER, f"Not better, the start is as good: {words}"
     elif gain - error > -NOTICED and (result.fresh is None or gain > 0.0):
         outcome, first = Outcome.NOT_BETTER, f"Not better: {words}"
     elif not gain + error < -NOTICED:
@@ -111,6 +113,11 @@ def verdict_of(result: "TuneResult[AbstractVehicle]") -> Verdict:
     else:
         outcome, first = Outcome.BETTER, f"Better: {words}"
     return Verdict(outcome, f"{first}{cost}{held}.")
+
+
+def _is_none(gain: float, error: float) -> bool:
+    """Whether a gain of so many percent, with its error, is none."""
+    return abs(gain) <= NOTICED and (error <= NOTICED or gain == 0.0)
 
 
 def _allowed(result: "TuneResult[AbstractVehicle]", name: str = "") -> dict[str, LimitRange]:
@@ -125,8 +132,10 @@ def _change(result: "TuneResult[AbstractVehicle]") -> tuple[float, str]:
     signed = name in signed_metrics(result)
     if fresh is None or not np.all(np.isfinite(fresh.change(name))):
         here = change_in_percent(result, name, result.before[name], result.after[name])
-        change = 100.0 * (result.after[name] - result.before[name]) if here is None else here
-        share = _from_to(result, name, result.before[name], result.after[name]) if here is None else percentage(here)
+        sides = result.before[name], result.after[name]
+        share = _from_to(result, name, *sides) if here is None else percentage(here)
+        change = relative_change(*sides)  # a change from zero is judged as one of 100 %, whatever the unit
+        change = 100.0 * float(np.sign(sides[1] - sides[0])) if change is None else change
         return change, f"{name} {share} {result.elsewhere or 'on the road of the tuning'}"
     mean, half = 100.0 * float(np.mean(fresh.change(name))), 100.0 * fresh.half_width(name)
     roads = f"{fresh.roads} fresh roads" if fresh.roads > 1 else "1 fresh road, which gives no interval"

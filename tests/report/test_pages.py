@@ -20,6 +20,7 @@ from jaxdamp.report import (
     Attempts,
     FitPart,
     Report,
+    add_tuning,
     baseline_table,
     bench_report,
     bench_verdict,
@@ -195,6 +196,15 @@ def test_rides_in_words(rides: dict[str, Response]) -> None:
         (shop,) = ride_verdict({"soft": rides["soft"]})
     travel = float(rides["soft"].metrics()["working_space_peak_to_peak"])
     assert f"suspension travel {travel / 0.0254:.3g} in," in shop and f"tyre load {soft / 4.4482216:.3g} lbf." in shop
+
+
+def test_the_page_of_a_robust_tuning_has_the_cost_of_the_scatter(tuned: TuneResult, monkeypatch) -> None:
+    monkeypatch.setattr(Report, "picture", lambda *_: None)
+    (effect,) = tune.tolerance_effects(tuned.metric, tuned.vehicle, roads.white("C", 20.0), {"damper.rate": 0.1})
+    robust = dataclasses.replace(tuned, tolerances=(effect,))
+    page = Report("Tuning")
+    add_tuning(page, robust)
+    assert robust.tolerance_table().to_html(words=True) in page.to_html()
 
 
 @pytest.mark.exhaustive

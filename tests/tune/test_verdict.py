@@ -75,6 +75,28 @@ def test_the_verdict_is_that_of_the_fresh_roads(metrics, outcome, words):
     assert data["verdict"] == outcome.name
 
 
+def test_a_start_that_is_as_good_is_said_to_be():
+    """Not that a gain of nothing is not shown, on however few roads."""
+    for comfort in ([1.0] * 4, [1.0], [1.0003, 0.9998, 1.0001, 1.0]):
+        result = made_up(comfort, [1.0] * len(comfort), [1.0] * len(comfort))
+        assert result.verdict.outcome is Outcome.NOT_BETTER, comfort
+        assert result.verdict.sentence.startswith(f"Not better, the start is as good: {COMFORT} "), comfort
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_a_metric_that_may_be_negative_is_judged_alike_in_every_unit(size):
+    """8 % lower, for 2 % more of another metric: 0.2 mm on a bump of 5 mm are as much as 2 mm on one of 5 cm."""
+    words: dict[str, Any] = dict(warnings=(), status=Status.CONVERGED, history=(1.0,), parameters=(), limits={})
+    words |= dict(active_limits=(), units={MEAN: "m", COMFORT: ""})
+    for after, outcome in ((0.92, Outcome.BETTER), (0.99, Outcome.TRADE), (1.01, Outcome.NOT_BETTER)):
+        sides = {MEAN: size, COMFORT: 1.0}, {MEAN: after * size, COMFORT: 1.02}
+        result = TuneResult(CAR, CAR, MEAN, before=sides[0], after=sides[1], **words)
+        assert result.verdict.outcome is outcome, result.verdict.sentence
+    words |= dict(units={MEAN: "m"})
+    from_zero = TuneResult(CAR, CAR, MEAN, before={MEAN: 0.0}, after={MEAN: -size}, **words)
+    assert from_zero.verdict.outcome is Outcome.BETTER
+
+
 def test_metrics_that_may_be_negative_have_no_percent():
     """A limit of -5 % of a negative number lets it fall, whereas its quotient rises."""
     fresh = Rescore({MEAN: np.full(3, -0.02)}, {MEAN: np.array([-0.0209, -0.021, -0.0211])}, {MEAN: "m"}, MEAN)
