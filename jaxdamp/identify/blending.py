@@ -15,6 +15,7 @@ from jaxdamp.dampers import AbstractDamper, Scheduled, laws_inside, without_fitt
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.model import Model, is_memoryless, law_of, on_rig
 from jaxdamp.identify.predicting import predict_runs, used_samples
+from jaxdamp.parameters import FreeParameters
 from jaxdamp.rig import Rig
 
 
@@ -33,6 +34,7 @@ class AtSetting(NamedTuple):
     fit_percent: float  # over all records
     rmse: float  # the same [N]
     is_only_minimum: bool  # whether no other start can lead elsewhere
+    free: FreeParameters  # what was fitted
     undetermined: tuple[str, ...] = ()  # the numbers of the law that these records do not determine
 
     @property

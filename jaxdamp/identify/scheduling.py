@@ -18,6 +18,7 @@ from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Figure
 from jaxdamp.bench import BenchRun, as_runs, contradictions, usable
 from jaxdamp.dampers import Scheduled, takes_command
+from jaxdamp.identify.at_levels import choices_of, ties_at
 from jaxdamp.identify.blending import AtSetting, Choice, choose_blend, with_blended_forces
 from jaxdamp.identify.contradicting import refuse_contradicting
 from jaxdamp.identify.estimating import undetermined
@@ -25,13 +26,13 @@ from jaxdamp.identify.fitting import fit, solve
 from jaxdamp.identify.judging import fitted_models
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import OFFSET, Machine, held_constant_forces, refuse_lag_of_held, without_command_lag
-from jaxdamp.identify.model import law_of, own_names, rig_of
+from jaxdamp.identify.model import Model, OnRig, law_of, own_names, rig_of
 from jaxdamp.identify.predicting import score
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.settings import FIT, PROBLEM, SCHEDULED, FitSettings, ScheduledSettings
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.identify.stated import COMMAND_REMEDY, refuse_lacking, stated_parameters
-from jaxdamp.parameters import free_parameters, get, match_paths, name_patterns, parameters, with_values
+from jaxdamp.parameters import get, match_paths, name_patterns, parameters, with_values
 from jaxdamp.rig import Rig
 
 
@@ -279,11 +280,14 @@ class Chain:
         if of_law := [path for path in problem.per_record if not path.startswith("rig.")]:
             remedy = "Numbers of the law have a value for each setting: fit the records of one setting by themselves."
             _checks.refuse("per_record", "name numbers of the machine for a law at settings", ", ".join(of_law), remedy)
+        self._named_common(problem.free.tree)
         solution = solve(problem, starts=starts, max_steps=self.how["max_steps"], solver=self.how["solver"])
         models, model = fitted_models(problem, solution.best.values)
         errors = score(models or model, problem.runs, initial_state=problem.initial_state)[:2]
         open_numbers = undetermined(problem, solution.best)
-        return AtSetting(law_of(model), rig_of(model), problem.runs, *errors, solution.closed_form, open_numbers)
+        return AtSetting(
+            law_of(model), rig_of(model), problem.runs, *errors, solution.closed_form, problem.free, open_numbers
+        )
 
     def together(self, alone: Alone, blend: str) -> FitResult:
         """The fit of all records of these settings as one law, from the laws of each.
@@ -300,28 +304,29 @@ class Chain:
         place = "laws" if machine is None else "law.laws"
         tie = {f"{place}.{k}.{path}": f"{place}.0.{path}" for path in shared for k in range(1, len(laws))}
         for k, at in enumerate(alone.values()):
-            tie |= self._tied_at(at, f"{place}.{k}.")
+            tie |= ties_at(at, f"{place}.{k}.", self.how["tie"])
+        chosen = choices_of(alone.values(), place, self.how, tie, machine)
         blended = tuple(with_values(law, means) for law in laws)
         at_levels = Scheduled.of_equal_structure(laws) and not (varying and blend == "force")
         scheduled = Scheduled(blended, list(alone), min(alone), "parameters" if at_levels else "force")
         held = held_constant_forces(scheduled, machine)
-        how: FitSettings = {**self.how, "starts": 1, "tie": tie, "freeze": [*self.how["freeze"], *held]}
+        how: FitSettings = {**self.how, **chosen, "starts": 1, "freeze": [*chosen["freeze"], *held]}
         result = fit(scheduled, [*itertools.chain(*map(self.at, alone)), *varying], rig=machine, **how)
         return with_blended_forces(result) if at_levels and blend == "force" else result
 
-    def _tied_at(self, at: AtSetting, level: str) -> dict[str, str]:
-        """The ties of the call at one setting, with the path of this level before those of the law."""
-        names, inside = own_names(at.model).find_keys("tie", self.how["tie"]), "" if at.rig is None else "law."
-        ties = free_parameters(at.model, tie=names, move=True).ties
-        return dict([[p if p.startswith("rig.") else level + p.removeprefix(inside) for p in pair] for pair in ties])
+    def _named_common(self, model: Model) -> list[str]:
+        """The paths that the call names as common, in the law of the model of one setting."""
+        names = own_names(model).find("common", name_patterns("common", self.common))
+        names = [name.removeprefix("law.") for name in names] if isinstance(model, OnRig) else names
+        return match_paths([p.path for p in parameters(law_of(model))], names)
 
     def _shared_by(self, alone: Alone) -> list[str]:
         """The paths of the parameters that are common to all settings; of tied ones, that which the others follow."""
         paths = [[p.path for p in parameters(at.law)] for at in alone.values()]
         in_all = [path for path in paths[0] if all(path in of_law for of_law in paths)]
         first = next(iter(alone.values()))
-        stated, tied = stated_parameters(first.law, self.runs), self._tied_at(first, "")
-        named = [*match_paths(in_all, name_patterns("common", self.common)), *(p for p in tied if p.startswith("rig."))]
+        stated, tied = stated_parameters(first.law, self.runs), ties_at(first, "", self.how["tie"])
+        named = [*self._named_common(first.model), *(p for p in tied if p.startswith("rig."))]
         shared = dict.fromkeys(tied.get(path, path) for path in named)
         return [path for path in shared if path in in_all and path not in stated]  # each level has them as stated
 

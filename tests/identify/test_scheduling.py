@@ -59,6 +59,41 @@ def test_each_record_has_a_zero_error_of_its_own(runs):
         identify.fit_scheduled(Bilinear, runs, per_record=["rebound_rate"])
 
 
+@pytest.mark.parametrize(
+    "said",
+    [
+        {"freeze": ["law.rebound_rate"]},
+        {"over": ["law.compression_rate"]},
+        {"bounds": {"law.rebound_rate": (900.0, 2100.0)}, "common": ["law.rebound_rate"]},
+        {"priors": {"law.rebound_rate": (1000.0, 1e5)}, "common": ["law.rebound_rate"]},
+    ],
+    ids=lambda said: "-".join(said),
+)
+def test_names_of_a_law_beside_the_machine_hold_at_all_settings(runs, said):
+    """They were refused after the fits of every setting, where the paths are longer."""
+    found = identify.fit_scheduled(Bilinear(1500.0, 1500.0), runs, starts=1, **said)
+    rates = [f"law.laws.{k}.rebound_rate" for k in range(3)]
+    free = rates[:1] if "common" in said else []
+    assert [e.name for e in found.result.parameters if e.name in rates] == free
+
+
+def test_wrong_names_are_refused_before_any_fit(runs):
+    shown: list[str] = []
+    wrong: list[Any] = [{"common": ["rate"]}, {"freeze": ["law.rate"]}]
+    for said in wrong:
+        with pytest.raises(ValueError, match="No parameter is named"):
+            identify.fit_scheduled(Bilinear, runs, progress=shown.append, **said)
+    assert set(shown) == {"0 alone"}
+
+
+def test_a_name_means_at_all_settings_what_it_means_at_one(runs):
+    """The last part of a longer path counts too, so that the lag inside was held in the common fit."""
+    some, law = [run for run in runs if run.command != 2.0], Lag(Lag(Linear(1000.0), 1e-3), 2e-3)
+    result = identify.fit_scheduled(law, some, rig=None, freeze=["lag_time"], starts=1).result
+    free = [f"laws.{k}.law.{name}" for k in range(2) for name in ("law.rate", "lag_time")]
+    assert sorted(e.name for e in result.parameters) == sorted(free)
+
+
 FACTORS = {0.0: 4.0, 1.0: 1.0, 2.0: 0.25}
 
 

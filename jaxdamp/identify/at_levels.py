@@ -1,0 +1,64 @@
+"""What a call says of the parameters of a law, said of each law of a `Scheduled`, whose paths are longer."""
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+from typing import NamedTuple
+
+from jaxdamp.identify.blending import AtSetting
+from jaxdamp.identify.model import own_names
+from jaxdamp.identify.settings import Free
+from jaxdamp.parameters import free_parameters, match_paths, name_patterns, parameters
+from jaxdamp.rig import Rig
+
+
+OF_RIG = "rig."
+Limits = dict[str, tuple[float, float]]
+
+
+class AtLevel(NamedTuple):
+    """The choices of a call for the law at one setting: by their paths, names mean the same beside other settings."""
+
+    freeze: list[str]
+    bounds: Limits
+    priors: Limits
+
+
+def placed(at: AtSetting, level: str) -> Callable[[str], str]:
+    """From a path in the model of one setting to that beside the other settings, whose law there is at `level`."""
+    inside = "" if at.rig is None else "law."
+    return lambda path: path if path.startswith(OF_RIG) else level + path.removeprefix(inside)
+
+
+def ties_at(at: AtSetting, level: str, tie: Mapping[str, str] | None) -> dict[str, str]:
+    """The ties of the call at one setting."""
+    place, names = placed(at, level), own_names(at.model).find_keys("tie", tie)
+    return {place(path): place(leader) for path, leader in free_parameters(at.model, tie=names, move=True).ties}
+
+
+def choices_at(at: AtSetting, level: str, asked: Free, beside: Collection[str]) -> AtLevel:
+    """The choices at one setting; `beside` are numbers of the machine that are free beside other settings only.
+
+    What the fit of this setting alone held, it holds here too.
+    """
+    place, known = placed(at, level), [p.path for p in parameters(at.model)]
+    free = {p.path: p.path for p in at.free.chosen} | dict(at.free.ties) | {path: path for path in beside}
+    held = [path for path in known if path not in free and not path.startswith(OF_RIG)]
+    frozen = match_paths(known, own_names(at.model).find("freeze", name_patterns("freeze", asked["freeze"])))
+    held += [path for path in frozen if path.startswith(OF_RIG)]
+
+    def of_free(argument: str, given: Mapping[str, tuple[float, float]] | None) -> Limits:
+        pairs = own_names(at.model).find_keys(argument, given).items()
+        return {place(free[path]): pair for name, pair in pairs for path in match_paths(known, [name]) if path in free}
+
+    return AtLevel([*map(place, held)], of_free("bounds", asked["bounds"]), of_free("priors", asked["priors"]))
+
+
+def choices_of(alone: Iterable[AtSetting], place: str, asked: Free, tie: Mapping[str, str], rig: Rig | None) -> Free:
+    """The choices at all settings, with all ties; a prior of tied numbers is one of the number that they follow."""
+    lag = [f"{OF_RIG}command_lag"] * (rig is not None and bool(rig.command_lag))
+    freeze, bounds, priors = list[str](), Limits(), Limits()
+    for k, at in enumerate(alone):
+        level = choices_at(at, f"{place}.{k}.", asked, lag)
+        freeze += level.freeze
+        bounds |= level.bounds
+        priors |= {tie.get(path, path): pair for path, pair in level.priors.items()}
+    return {"over": None, "freeze": [*dict.fromkeys(freeze)], "bounds": bounds, "tie": tie, "priors": priors}
