@@ -28,7 +28,7 @@ from jaxdamp.cli.words import Axis, Limit
 from jaxdamp.control import Controlled
 from jaxdamp.dampers import Scheduled
 from jaxdamp.parameters import match_paths, modules_inside, named_parameters
-from jaxdamp.report import MOST_POINTS, Table, best_points, sweep_report, tuning_report
+from jaxdamp.report import MOST_POINTS, Table, best_points, points_table, sweep_report, tuning_report
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import stationary_notes
 from jaxdamp.sweeps import grid, without_effect
@@ -261,7 +261,7 @@ def sweep_command(
         at_start = {name: float(value) for name, value in ride(at if len(at) == len(axes) else None).items()}
         spans = limit_spans(limits, names, at_start)
         before = None if beside is None else dict(ride.of_vehicle(beside)())
-        table = data.jaxdamp.table()
+        table = points_table(data, spans)
         _show_points(screen, table, lambda: best_points(data, spans, before), limited=bool(spans))
         remarks += stationary_notes(ride.vehicle, surface) if isinstance(surface, WhiteRoad) else []
         remarks += [f"No effect on {name}: {', '.join(flat)}." for name, flat in without_effect(data).items()]

@@ -42,7 +42,12 @@ from jaxdamp.report.rides import (
     ride_tables as ride_tables,
     ride_verdict as ride_verdict,
 )
-from jaxdamp.report.sweeps import MOST_POINTS as MOST_POINTS, best_points as best_points, sweep_report
+from jaxdamp.report.sweeps import (
+    MOST_POINTS as MOST_POINTS,
+    best_points as best_points,
+    points_table as points_table,
+    sweep_report,
+)
 from jaxdamp.report.tunings import add_tuning as add_tuning, tuning_report
 from jaxdamp.report.vehicle_fits import (
     ride_records_table as ride_records_table,

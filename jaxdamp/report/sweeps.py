@@ -2,6 +2,7 @@
 
 import functools
 from collections.abc import Hashable, Mapping, Sequence
+from itertools import starmap
 from typing import Unpack
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from jaxdamp import plots
 from jaxdamp._display import display
 from jaxdamp._settings import with_defaults
-from jaxdamp._tables import percent_change, typeset_unit
+from jaxdamp._tables import Column, Table, percent_change, typeset_unit
 from jaxdamp._types import DataArray, Dataset, ScalarLike
 from jaxdamp._words import first_upper, path_words
 from jaxdamp.report.page import PAGE, Page, Report
@@ -32,7 +33,7 @@ def sweep_report(
     plane: tuple[str, str] | None = None,
     **page: Unpack[Page],
 ) -> Report:
-    """A page on a sweep over a grid. Its table has the first thousand points, `data.jaxdamp.table()` has all.
+    """A page on a sweep over a grid. Its table has the first thousand points, and whether each is within the limits.
 
     Arguments:
         data: of `jaxdamp.sweep`.
@@ -62,8 +63,30 @@ def sweep_report(
             report.picture(draw, " and ".join(map(path_words, plane)), "plane.png")
     else:
         report.text(f"Grids of more than {MOST_AXES} axes of several values are not drawn.")
-    report.table(data.jaxdamp.table().first(MOST_POINTS))
+    report.table(points_table(data, limits).first(MOST_POINTS))
     return report
+
+
+def points_table(data: Dataset, limits: Limits | None = None) -> Table:
+    """A row for each point, and whether it is within the limits, which the title names.
+
+    Arguments:
+        data: of `jaxdamp.sweep`.
+        limits: as in `sweep_report`.
+    """
+    table, spans = data.jaxdamp.table(), limit_spans(limits, [str(name) for name in data.data_vars])
+    if not spans:
+        return table
+    words = np.where(data["failed"], "", np.where(_within(data, spans), "met", "not met")).ravel()
+    rows = tuple((*row, word) for row, word in zip(table.rows, words.tolist(), strict=True))
+    title = f"{table.title}; limits: {', '.join(starmap(functools.partial(_limit_in_words, data), spans.items()))}"
+    return Table(title, (*table.columns, Column("limits")), rows)
+
+
+def _limit_in_words(data: Dataset, name: str, span: tuple[float, float]) -> str:
+    """A limit with its unit, as "working_space_rms ≤ 0.02 m"."""
+    ends = [f"{sign} {_in_words(data, name, end)}" for sign, end in zip("≥≤", span, strict=True) if np.isfinite(end)]
+    return f"{name} {' and '.join(ends)}"
 
 
 def best_points(

@@ -7,7 +7,7 @@ from typing import final
 import numpy as np
 from jaxtyping import Bool, Float
 
-from jaxdamp._tables import Column, Contents, Table, plain
+from jaxdamp._tables import Column, Contents, Table, plain, typeset_unit
 from jaxdamp.tune.limits import percentage
 from jaxdamp.tune.rescoring import Rescore
 from jaxdamp.tune.verdict import relative_change
@@ -48,7 +48,7 @@ class Combinations:
 
     def table(self) -> Table:
         """A row for each combination: its numbers, its metrics, and whether it meets the limits."""
-        columns = [Column(name, self.units[name]) for name in (*self.choices, *self.metrics)]
+        columns = [Column(name, typeset_unit(self.units[name])) for name in (*self.choices, *self.metrics)]
         words = np.where(self.met, "met", np.where(self._without_number, "no number", "not met"))
         rows = zip(*self.choices.values(), *self.metrics.values(), words.tolist(), strict=True)
         return Table("All combinations", (*columns, Column("limits")), tuple(rows))

@@ -134,6 +134,7 @@ def test_sweep_of_a_vehicle_from_a_file_writes_a_table_and_pictures(law: Path, t
     limits = {name: most for word, most in largest for name in rows[0] if word in name}
     within = [row for row in rows if all(float(row[name]) <= most for name, most in limits.items())]
     assert len(limits) == 4 and 0 < len(within) < 4
+    assert [row["limits"] for row in rows] == ["met" if row in within else "not met" for row in rows]
     page, comfort = (out / "report.html").read_text(), "weighted_rms_sprung_acceleration [m/s²]"
     sentence = f"{len(within)} of 4 points are within all limits; smallest body acceleration, weighted RMS: "
     best = min(within, key=lambda row: float(row[comfort]))

@@ -6,7 +6,7 @@ import pytest
 import jaxdamp
 from jaxdamp._display import Display, display, shown_in
 from jaxdamp.report import sweep_report
-from jaxdamp.report.sweeps import MOST_POINTS, best_points
+from jaxdamp.report.sweeps import MOST_POINTS, best_points, points_table
 from jaxdamp.sweeps import without_effect
 from tests.sweeps.cases import AXES
 
@@ -40,7 +40,11 @@ def test_where_no_point_is_within_the_limits_the_nearest_is_named():
 def test_numbers_in_sentences_are_rounded_as_they_are_shown():
     data = jaxdamp.sweep(product, {"a": [1179.34016], "b": [0.5]})
     data["a"].attrs["units"], data["product"].attrs["units"] = "kg", "N"
+    assert points_table(data).columns == data.jaxdamp.table().columns
     with shown_in(Display("imperial")):
+        limited = points_table(data, {"product": (400.0, 500.0)})
+        assert limited.title.endswith("limits: product ≥ 89.92 lbf and ≤ 112.4 lbf")
+        assert limited.records()[0]["limits"] == "not met"
         (sentence,) = best_points(data)
         assert sentence == display().words(sentence) == "Smallest product: 132.6 lbf at a = 2600 lb, b = 0.5."
 

@@ -77,6 +77,7 @@ def test_clicks_are_chosen_and_swept() -> None:
     assert combinations is not None and combinations.choices["damper.command"].tolist() == clicks[order].tolist()
     np.testing.assert_allclose(combinations.metrics[COMFORT], comfort[order], rtol=1e-9)
     assert combinations.met.tolist() == [True] * 3 + [False] * 3
+    assert f"{COMFORT} [m/s²]" in combinations.table().headings()  # as in the other tables of the tuning
     assert float(get(result.vehicle, "damper.command")) == order[0] + 1
     gain = 100.0 * (comfort[order[0]] / comfort[order[1]] - 1.0)
     beside = f"beside the next, damper.command = {order[1] + 1}: {gain:+.1f} %"
