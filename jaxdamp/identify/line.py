@@ -82,6 +82,12 @@ class ControlCharts(AbstractResult):
         return self.names[there[starts[-1]]] if starts else ""
 
     @property
+    def chart_names(self) -> tuple[str, ...]:
+        """Of the charts: their kind, and of several of one kind their numbers, as "Ewma(weight=0.1, width=2.8)"."""
+        kinds = [chart.name for chart in self.charts]
+        return tuple(chart.name if kinds.count(chart.name) == 1 else repr(chart) for chart in self.charts)
+
+    @property
     def false_alarms(self) -> float:
         """So many signals are expected of as many dampers that are all alike but for chance."""
         rate = sum(1.0 / chart.average_run_length() for chart in self.charts)
@@ -93,7 +99,7 @@ class ControlCharts(AbstractResult):
         texts: list[list[str]] = [[] for _ in self.names]
         for quantity, rows in self.signals.items():
             for i in np.flatnonzero(np.any(rows != 0, axis=0)):
-                signed = [(c.name, int(s)) for c, s in zip(self.charts, rows[:, i], strict=True) if s]
+                signed = [(chart, int(s)) for chart, s in zip(self.chart_names, rows[:, i], strict=True) if s]
                 words = ", ".join(f"{name} {'high' if sign > 0 else 'low'}" for name, sign in signed)
                 texts[i].append(f"{quantity}: {words}")
         return tuple("; ".join(text) for text in texts)
@@ -133,8 +139,8 @@ class ControlCharts(AbstractResult):
     def tables(self) -> dict[str, Table]:
         """A row for each damper, the limits, and the run lengths of the charts."""
         charts = tuple(
-            (chart.name, chart.limit, *(chart.average_run_length(shift) for shift in (0.0, 0.5, 1.0, 2.0)))
-            for chart in self.charts
+            (name, chart.limit, *(chart.average_run_length(shift) for shift in (0.0, 0.5, 1.0, 2.0)))
+            for name, chart in zip(self.chart_names, self.charts, strict=True)
         )
         columns = [Column("chart"), Column("limit", "standard deviations")]
         columns += [Column("no shift"), *(Column(f"shift of {shift}") for shift in ("0.5", "1", "2"))]
@@ -146,7 +152,7 @@ class ControlCharts(AbstractResult):
 
     def _limits(self) -> Table:
         columns = (Column("quantity"), Column("unit"), Column("centre"), Column("standard deviation"))
-        counts = tuple(Column(f"{chart.name}, signals", spec="d") for chart in self.charts)
+        counts = tuple(Column(f"{name}, signals", spec="d") for name in self.chart_names)
         rows = tuple(
             (name, unit, float(centre), float(deviation), *map(int, np.count_nonzero(rows, axis=1)), self.since(name))
             for (name, unit), centre, deviation, rows in zip(

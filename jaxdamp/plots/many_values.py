@@ -170,7 +170,7 @@ def control_charts(result: ControlCharts) -> Figure:
     figure = _style.new_figure(4.2 * len(result.charts), 0.9 + 2.4 * len(drawn))
     grid, place = figure.add_gridspec(len(drawn), len(result.charts)), np.arange(len(result.names)) + 1
     for row, (name, unit) in enumerate(drawn):
-        for column, chart in enumerate(result.charts):
+        for column, (chart, kind) in enumerate(zip(result.charts, result.chart_names, strict=True)):
             axes = figure.add_subplot(grid[row, column])
             scale, centre, label = 1.0, 0.0, "[standard deviations]"
             if chart.name == "individuals":
@@ -184,7 +184,7 @@ def control_charts(result: ControlCharts) -> Figure:
                 axes.plot(place, centre + scale * values, ".-", color=_style.COLOURS[0], linewidth=0.6, markersize=3)
                 out = (signs != 0) & (np.abs(values) > chart.limit)
                 axes.plot(place[out], centre + scale * values[out], "o", color=_style.COLOURS[1], markersize=4)
-            _style.dress(axes, "damper" if row == len(drawn) - 1 else "", label, f"{name}, {chart.name}")
+            _style.dress(axes, "damper" if row == len(drawn) - 1 else "", label, f"{name}, {kind}")
     figure.suptitle(f"{len(result.names)} dampers, limits from {result.baseline.size} of them (shaded)")
     more = len(result.quantities) - len(drawn)
     _style.note_below(figure, [f"{more} further quantities are in the tables."] if more else [])

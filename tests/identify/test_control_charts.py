@@ -123,6 +123,18 @@ def test_a_shift_lasts_beside_a_damper_without_the_number(missing):
     assert control_charts({"force": force}, baseline=20, charts=[Ewma()]).since("force") == "22"
 
 
+def test_two_charts_of_a_kind_are_told_apart():
+    force = np.random.default_rng(3).standard_normal(30)
+    force[20:] += 3.0
+    found = control_charts({"force": force}, baseline=20, charts=[Ewma(0.1, 2.8), Shewhart(), Ewma(0.4, 2.8)])
+    slow, fast = "Ewma(weight=0.1, width=2.8)", "Ewma(weight=0.4, width=2.8)"
+    (row,) = found.tables()["limits"].records()
+    for place, name in enumerate([slow, "individuals", fast]):
+        assert row[f"{name}, signals"] == np.count_nonzero(found.signals["force"][place]) > 0
+    assert slow in (text := str(found.table())) and fast in text
+    assert [length["chart"] for length in found.tables()["run_lengths"].records()] == [slow, "individuals", fast]
+
+
 def test_labels_that_repeat_outside_the_baseline_do_no_harm():
     force = np.random.default_rng(3).standard_normal(30)
     found = control_charts({"force": force}, baseline=NAMES[9:19], names=[*NAMES[:28], "3", "4"])
