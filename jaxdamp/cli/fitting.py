@@ -104,7 +104,7 @@ def fit(
     table = reading.table(files, side)
     kind = None if table is None else through_points(law)
     if table is not None and kind is not None:
-        refused = [*_given(**given, resume=resume), *reading.of_records, *how.given, *["rig"] * (rig != RIG)]
+        refused = [*_given(**given, resume=resume, keep_bad=reading.keep_bad), *how.given, *["rig"] * (rig != RIG)]
         fit_table(screen, table, kind, output, report, refused)
         return
     names = law_names(law, points=table is not None)

@@ -46,20 +46,17 @@ class Reading:
         return bench.read(list(files), **self.read.arguments())
 
     def table(self, files: Sequence[Path], side: str | None) -> ForceVelocityTable | None:
-        """The force-velocity table that the files are; None for records."""
+        """The force-velocity table that the files are, which has no time and is not processed; None for records."""
         given = {name: self.read.given[name] for name in _OF_TABLES if name in self.read.given}
         if "sampling_rate" in self.read.given or not bench.are_tables(list(files), **given):
             if side is not None:
                 _checks.refuse("side", "be given with a force-velocity table", side, "These are records; leave it out.")
             return None
-        return bench.read_table(list(files), side=side, **given)
-
-    @property
-    def of_records(self) -> list[str]:
-        """The options given that are about records over time, of which a force-velocity table has none."""
         read = [name for name in self.read.given if name not in _OF_TABLES]
-        own = [name for name in ("cycles", "keep_rest", "keep_bad") if getattr(self, name)]
-        return [*read, *self.steps.given, *own]
+        for option in (*read, *self.steps.given, *(name for name in ("cycles", "keep_rest") if getattr(self, name))):
+            remedy = "Its points have no time, and are taken as they are."
+            _checks.refuse(option, "be left out with a force-velocity table", "given", remedy)
+        return bench.read_table(list(files), side=side, **given)
 
     def processing(self) -> dict[str, object]:
         """The steps of `BenchRun.process`.

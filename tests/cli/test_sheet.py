@@ -69,6 +69,9 @@ def test_what_says_nothing_of_a_sheet_is_refused(sheet: Path) -> None:
     ):
         said = refused(sheet.parent, *words, *option)
         assert f"Option {option[0]} must be left out with a force-velocity table" in said, option
+    for option in (["--gains", "force=2"], ["--keep-rest"], ["--drop-bad-rows"], ["--mean-cycle"]):
+        said = refused(sheet.parent, *words, "--sign", "rebound-positive", "--law", "linear", *option)
+        assert f"Option {option[0]} must be left out with a force-velocity table" in said, option
 
 
 def test_all_laws_are_those_that_a_sheet_can_tell(sheet: Path, monkeypatch: pytest.MonkeyPatch) -> None:
