@@ -151,7 +151,7 @@ def tyres_in_tension(
     return (f"Wheel loads fell below zero, as linear tyres pull on the road: {'; '.join(pulled)}. {remedy}",)
 
 
-ALWAYS, OFTEN = 0.9, 0.3  # shares of the time that are said: at an end of the levels, at the limit of the rate
+ALWAYS, OFTEN = 0.9, 0.05  # shares of the time that are said: at an end of the levels, at the limit of the rate
 NEAR = 0.05  # of the range of the levels: nearer to an end, the limits of a command are rounded
 
 

@@ -64,6 +64,8 @@ def test_commands_that_stay_at_a_limit_are_said():
     slower = Controlled(QUARTER, Skyhook(), rate_limit=RateLimit(1.5, 1.5))
     (note,) = simulate(slower, ROAD, duration=1.0, every=5).notes
     assert note.endswith("at least 66 % of the time.")  # strides at the limit from end to end; of all instants it is 74
+    (note,) = simulate(Controlled(QUARTER, Skyhook(), rate_limit=RateLimit(20.0, 20.0)), ROAD, duration=1.0).notes
+    assert note.endswith(" 20 % of the time.")  # which costs 4 % of comfort
     assert not simulate(Controlled(QUARTER, Skyhook(), rate_limit=RateLimit(100.0, 100.0)), ROAD, duration=1.0).notes
 
 
