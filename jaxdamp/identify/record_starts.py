@@ -38,7 +38,9 @@ FIRST_CYCLES = 3.0  # of a record that tell how warm it begins
 FIRST_SHARE = 0.25  # of its motion at most
 UNKNOWN = 20.0  # K, standard deviation of a new record's temperature about the mean of the fitted ones
 COMPARED_PER_CYCLE = 200  # samples that are compared
-ROUNDS = 8  # of Newton's method
+ROUNDS = 40  # of Newton's method at most
+SETTLED = 1e-3  # K, step after which it ends
+WIDER, NARROWER = 4.0, 8.0  # by which the share of a step grows or falls behind one that was accepted or refused
 
 
 class FirstStates(NamedTuple):
@@ -147,8 +149,8 @@ def first_samples(run: BenchRun) -> int:
 def warmed(model: Model, run: BenchRun, paths: Sequence[str], noise: float, initial_state: str) -> Warmed:
     """The model with the temperature at the start of a record that its first cycles show.
 
-    It is the most likely one, 20 K about that of the model known beforehand, by Gauss and Newton's method. Without an
-    effect on the force it stays where it is.
+    It is the most likely one, 20 K about that of the model known beforehand, by Gauss and Newton's method with steps
+    that make it likelier. Without an effect on the force it stays where it is.
 
     `model` has the mean start of the fitted records; `paths` are the starts [K] in it, which all move together; `noise`
     is the standard deviation of the force [N] about the model.
@@ -163,15 +165,41 @@ def warmed(model: Model, run: BenchRun, paths: Sequence[str], noise: float, init
     return Warmed(with_values(model, {path: value + shift for path, value in begin.items()}), told)
 
 
+class _Tried(NamedTuple):
+    """The best shift [K] so far, with the sum of squares there, Newton's step and the share of it that is tried."""
+
+    shift: Scalar
+    squares: Scalar
+    step: Scalar
+    share: Scalar
+    rounds: Scalar
+
+
 @compiled_for_loops
 def _shift(batch: Batch, model: Model, begin: dict[str, Array], noise: Scalar) -> Scalar:
     def missed(shift: Scalar) -> Float[Array, " samples"]:
         own = {path: jnp.broadcast_to(value + shift, batch.dt.shape) for path, value in begin.items()}
         return dataclasses.replace(batch, fixed=batch.fixed | own)(model) / noise
 
-    def step(shift: Scalar, _: None) -> tuple[Scalar, None]:
+    def at(shift: Scalar) -> tuple[Scalar, Scalar]:
         residual, slope = jax.jvp(missed, (shift,), (jnp.ones_like(shift),))
         gain = jnp.sum(slope**2) + 1.0 / UNKNOWN**2
-        return shift - (jnp.sum(slope * residual) + shift / UNKNOWN**2) / gain, None
+        return jnp.sum(residual**2) + (shift / UNKNOWN) ** 2, -(jnp.sum(slope * residual) + shift / UNKNOWN**2) / gain
 
-    return jax.lax.scan(step, jnp.zeros_like(noise), None, ROUNDS)[0]
+    def tried(best: _Tried) -> _Tried:
+        shift = best.shift + best.share * best.step
+        squares, step = at(shift)
+        better = squares < best.squares  # never where the force is not finite
+        as_far = step * best.step > 0.5 * best.step**2  # the force falls exponentially: many steps of one length
+        wider = jnp.where(as_far, WIDER * best.share, jnp.minimum(WIDER * best.share, 1.0))
+        rounds = best.rounds + 1
+        refused = best._replace(share=best.share / NARROWER, rounds=rounds)
+        accepted = _Tried(shift, squares, step, wider, rounds)
+        return jax.tree.map(lambda new, old: jnp.where(better, new, old), accepted, refused)
+
+    def goes_on(best: _Tried) -> Array:
+        return (best.rounds < ROUNDS) & (jnp.abs(best.share * best.step) > SETTLED)
+
+    zero = jnp.zeros_like(noise)
+    begun = _Tried(zero, *at(zero), jnp.ones_like(noise), jnp.zeros((), int))
+    return jax.lax.while_loop(goes_on, tried, begun).shift

@@ -10,7 +10,7 @@ from jaxdamp.bench import BenchRun, SineTest, VirtualDyno, initial_temperature, 
 from jaxdamp.dampers import AbstractDamper, Bilinear, CoulombFriction, Heated, Linear, TemperatureScaled
 from jaxdamp.identify import compare, cross_validate, fit
 from jaxdamp.identify.held_out import on_records
-from jaxdamp.identify.record_starts import first_samples
+from jaxdamp.identify.record_starts import first_samples, warmed
 from jaxdamp.parameters import get, replace
 from jaxdamp.rig import Rig
 
@@ -82,6 +82,13 @@ def test_only_the_first_cycles_tell_the_temperature_and_they_are_not_scored(each
     cooler = each.score(otherwise)[2][0]
     assert cooler.largest_error < 0.1 * np.ptp(hot.force)  # that of the first samples would be larger
     assert np.max(each.respond(otherwise) - each.respond(hot)) > 10.0
+
+
+@pytest.mark.parametrize("rise", [0.0, 750.0, 1250.0])
+def test_the_temperature_is_found_however_far_the_mean_of_fitted_ones_is(hot, rise):
+    """Newton's whole step goes far beyond where the force has nearly vanished: none was left, or no finite one."""
+    found = warmed(replace(DAMPER, {"initial_rise": rise}), hot, ["initial_rise"], NOISE, "warm_up").model
+    assert float(get(found, "initial_rise")) == pytest.approx(42.0, abs=2.0)
 
 
 def test_a_fitted_record_is_predicted_by_its_own_values(each, runs):
