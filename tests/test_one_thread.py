@@ -10,9 +10,11 @@ import pytest
 import scipy.linalg
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from jaxdamp import bench
+from jaxdamp import bench, identify
 from jaxdamp._one_thread import one_thread, usable_cores
 from jaxdamp.bench import velocity
+from jaxdamp.dampers import Linear
+from jaxdamp.identify import predicting
 from jaxdamp.solve import Evaluation, Region, Scaling, SequentialQuadratic
 
 
@@ -111,3 +113,13 @@ def test_cores_that_a_process_may_not_use_do_not_count():
     finally:
         os.sched_setaffinity(0, before)
     assert usable_cores() == len(before)
+
+
+def test_shares_of_errors_do_not_depend_on_what_runs_beside_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a comparison they had one thread while another law was fitted, else several: their last bits differed."""
+    seen: list[set[int]] = []
+    sums = predicting._sums
+    monkeypatch.setattr(predicting, "_sums", lambda *channels: seen.append(threads()) or sums(*channels))
+    run = bench.VirtualDyno(Linear(1500.0), sampling_rate=200.0, force_noise=5.0).run(bench.SineTest(0.01, 1.0))
+    assert identify.error_shares(Linear(1400.0), run).shape > 0.9
+    assert seen == [{1}] and threads() == {2}

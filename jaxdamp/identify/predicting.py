@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from jaxdamp import _checks
+from jaxdamp._one_thread import one_thread
 from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._tables import Contents, with_unit
 from jaxdamp._traced import of_known_numbers
@@ -222,6 +223,7 @@ class ErrorShares(NamedTuple):
 
 
 @of_known_numbers
+@one_thread()  # sums of many products differ in their last bits with the number of threads
 def error_shares(
     law: Model | Sequence[Model], runs: BenchRun | Iterable[BenchRun], initial_state: str = "warm_up"
 ) -> ErrorShares:
