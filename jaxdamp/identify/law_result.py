@@ -129,6 +129,11 @@ class FitResult(AbstractFitted, Fit):
     record_rigs: tuple[Rig, ...] = dataclasses.field(default=(), kw_only=True)
 
     @property
+    def static_force(self) -> float:
+        """Gas force and zero error of the test machine [N], which the law does not hold; zero without a machine."""
+        return 0.0 if self.rig is None else float(self.rig.force_offset) + float(self.rig.gas_force)
+
+    @property
     def initial_states(self) -> tuple[Float[np.ndarray, " states"] | None, ...]:
         """The states at the first sample of each record, if they were estimated; None for records left out."""
         return tuple(None if start is None else np.asarray(start.initial_state) for start in self.record_starts)

@@ -36,7 +36,7 @@ def force_velocity(
     note: str = "",
     title: str = "",
     bands: Band | Mapping[str, Band] | None = None,
-    static_force: float = 0.0,
+    static_force: float | Mapping[str, float] = 0.0,
 ) -> Figure:
     """Force over velocity of one law or several, over the samples and the peak-velocity points of records.
 
@@ -55,7 +55,9 @@ def force_velocity(
         title: above the picture; the only law and the records if left out.
         bands: 95 % bands of the laws by name (`FitResult.band`), or that of the only law.
         static_force: gas force or zero error [N] in the records and not in the laws, such as
-            `float(result.rig.force_offset)`; the points are drawn without it, and a remark says so.
+            `result.static_force` of a fit; the points are drawn without it, and a remark says so. If laws were fitted
+            with different ones, by the names of the laws: the points are drawn without the first, and each law with the
+            difference of its own.
 
     Raises:
         ValueError: no law, or a baseline or band that is not of one of the laws.
@@ -63,9 +65,9 @@ def force_velocity(
     alone = _style.law_name(laws) if isinstance(laws, AbstractDamper) else ""
     remedy = "Take `result.law` of a fit, or laws by name."
     laws = _style.by_name("laws", laws, AbstractDamper, "a damper law", remedy, alone)
-    _checks.finite("static_force", static_force)
+    without, extra = _static_forces(static_force, laws)
     runs = () if runs is None else as_runs(runs)
-    runs = tuple(dataclasses.replace(run, force=run.force - static_force) for run in runs)
+    runs = tuple(dataclasses.replace(run, force=run.force - without) for run in runs)
     if baseline is not None:
         _checks.one_of("baseline", baseline, laws)
     if velocities is None:
@@ -78,16 +80,28 @@ def force_velocity(
     bands = {alone: bands} if isinstance(bands, Band) else bands or {}
     for name in bands:
         _checks.one_of("bands", name, laws)
-    curves, gaps = draw_laws(axes, laws, points, baseline, bands)
+    curves, gaps = draw_laws(axes, laws, points, baseline, bands, extra)
     shaded = fitted_range.shade(axes, laws.values(), points)
     _style.dress(axes, _style.VELOCITY, _style.FORCE, title or _title(alone, runs), zero="xy")
     axes.set_xlim(float(points.min()), float(points.max()))
     _name(axes, measured, curves, shaded)
-    force = _style.quantity(static_force, "N", "static force")
-    without = f"The measured points are drawn without the static force of {force}: gas or zero error."
-    remarks = [note, without if runs and static_force else "", *gaps]
+    said = f"The measured points are drawn without the static force of {_style.quantity(without, 'N', 'static force')}"
+    own = ", and each law with the difference of its own" * any(extra.values())
+    remarks = [note, f"{said}{own}: gas or zero error." if runs and (without or own) else "", *gaps]
     _style.note_below(figure, [remark for remark in remarks if remark])
     return figure
+
+
+def _static_forces(
+    given: float | Mapping[str, float], laws: Mapping[str, AbstractDamper]
+) -> tuple[float, dict[str, float]]:
+    """The static force without which records are drawn, and what that of each law is more."""
+    by_law = given if isinstance(given, Mapping) else dict.fromkeys(laws, given)
+    for name, force in by_law.items():
+        _checks.one_of("static_force", name, laws)
+        _checks.finite("static_force", force)
+    first = float(next(iter(by_law.values()), 0.0))
+    return first, {name: float(force) - first for name, force in by_law.items()}
 
 
 def _name(axes: Axes, measured: list, curves: list, shaded: list) -> None:
@@ -115,18 +129,20 @@ def draw_laws(
     velocities: Float[np.ndarray, " points"],
     baseline: str | None,
     bands: Mapping[str, Band] = MappingProxyType({}),
+    extra: Mapping[str, float] = MappingProxyType({}),
 ) -> tuple[list, list[str]]:
-    """One curve for each law; the handles for the legend, and remarks on gaps in the curves."""
+    """One curve for each law, with the extra force [N] of some; the handles for the legend, and remarks on gaps."""
     handles, gaps = [], []
     styles = _style.design_styles(list(laws), baseline)
     for name, law in laws.items():
         label, style = _style.in_words(name) + " (settled)" * bool(law.initial_state().size), styles[name]
-        lines, remarks = fitted_range.settled(axes, law, velocities, name, label=label, **style)
+        more = extra.get(name, 0.0)
+        lines, remarks = fitted_range.settled(axes, law, velocities, name, extra=more, label=label, **style)
         handles, gaps = handles + lines, gaps + remarks
         if name in bands:
             band, label = bands[name], f"{_style.in_words(name)}, 95 %"
             shade = {"color": style["color"], "alpha": 0.25, "linewidth": 0.0, "zorder": 2.0, "label": label}
-            handles.append(axes.fill_between(band.velocity, band.lower, band.upper, **shade))
+            handles.append(axes.fill_between(band.velocity, band.lower + more, band.upper + more, **shade))
     return handles, gaps
 
 

@@ -47,8 +47,7 @@ class _Damper:
         measured = evaluate(fit.runs) if evaluation is None else evaluation
         name = _style.law_name(fit.law) if rung is None else _style.in_words(rung.name)
         laws = {_style.in_words(name): law for name, law in rung.laws().items()} if rung else {name: fit.law}
-        static = 0.0 if fit.rig is None else float(fit.rig.force_offset) + float(fit.rig.gas_force)
-        return cls(measured, rung, fit, laws, dict.fromkeys(measured.settings, static), name)
+        return cls(measured, rung, fit, laws, dict.fromkeys(measured.settings, fit.static_force), name)
 
     @property
     def runs(self) -> tuple[BenchRun, ...]:

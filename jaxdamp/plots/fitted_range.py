@@ -30,10 +30,12 @@ def curve(axes: Axes, law: AbstractDamper, velocities: Points, force: Points, **
     return handles
 
 
-def settled(axes: Axes, law: AbstractDamper, velocities: Points, name: str, **style: object) -> tuple[list, list[str]]:
-    """The settled force of a law over velocity: handles as of `curve`, and a remark where it has a gap."""
+def settled(
+    axes: Axes, law: AbstractDamper, velocities: Points, name: str, *, extra: float = 0.0, **style: object
+) -> tuple[list, list[str]]:
+    """Settled and extra force [N] of a law over velocity: handles as of `curve`, and a remark where it has a gap."""
     found = quasi_static(law, velocities)
-    handles = curve(axes, law, velocities, np.asarray(found.force), **style)
+    handles = curve(axes, law, velocities, np.asarray(found.force) + extra, **style)
     return handles, [f"{name}: {found.note}"] if found.note else []
 
 

@@ -95,7 +95,7 @@ _MOST_LAWS = 12  # of small multiples
 def loops_by_law(comparison: Comparison, record: str | None = None) -> Figure:
     """The same record in a small panel for each law, the best first: measured force and that of the law over velocity.
 
-    Of points of a force-velocity table the curves of all laws over them.
+    Of points of a force-velocity table the curves of all laws over them, each with the static force of its fit.
 
     Arguments:
         comparison: of `identify.compare`; of more than twelve laws the best are drawn, and the title says so.
@@ -141,10 +141,10 @@ def loops_by_law(comparison: Comparison, record: str | None = None) -> Figure:
 
 
 def _over_points(results: Mapping[str, FitResult], runs: Sequence[BenchRun]) -> Figure:
-    """The curves of laws over the points of a table, with the static force of the machine, if one has it, left out."""
-    machine = next((result.rig for result in results.values() if result.rig is not None), None)
-    static = 0.0 if machine is None else float(machine.force_offset) + float(machine.gas_force)
-    return force_velocity({name: result.law for name, result in results.items()}, runs=runs, static_force=static)
+    """The curves of laws over the points of a table, with the static force of the first one's machine left out."""
+    laws = {name: result.law for name, result in results.items()}
+    static = {name: result.static_force for name, result in results.items()}
+    return force_velocity(laws, runs=runs, static_force=static)
 
 
 def _title(result: FitResult, runs: Sequence[BenchRun], shown: Sequence[BenchRun], name: str) -> str:

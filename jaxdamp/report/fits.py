@@ -253,7 +253,7 @@ def _add_curves(report: Report, comparison: Comparison, baseline: AbstractDamper
     if baseline is not None:
         drawn |= _with_curves(report, {BASELINE: baseline}, points)
     machine, runs = best.result.rig, best.result.runs
-    static = 0.0 if machine is None else float(machine.force_offset) + float(machine.gas_force)
+    static = {name: rung.result.static_force for rung in order for name in rung.laws() if name in drawn}
     if machine is not None and (friction := float(machine.friction)):
         notes += [f"The measured points hold the friction of the machine, {friction:.4g} N, the laws do not."]
     without_force = None if machine is None else dataclasses.replace(machine, force_offset=0.0, gas_force=0.0)

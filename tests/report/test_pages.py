@@ -97,7 +97,27 @@ def test_the_picture_of_the_curves_names_the_friction_in_the_measured_points(com
         fits._add_curves(report, dataclasses.replace(comparison, rungs=(held,)), None)
     ((note,),) = [[figure.get_supxlabel()] for figure in pictures]
     assert "The measured points hold the friction of the machine, 12.3 N, the laws do not." in " ".join(note.split())
-    assert "without the static force of 20 N" in note
+    assert "without the static force of 20 N: gas" in note
+
+
+def test_each_law_is_drawn_with_the_static_force_of_its_own_machine(comparison: Comparison) -> None:
+    """The points are drawn without that of the best; the curve of another law moves by the difference."""
+    offsets = {comparison.best.name: 20.0, "linear": 50.0}
+    rungs = (
+        rung._replace(result=dataclasses.replace(rung.result, rig=Rig(force_offset=offsets[rung.name])))
+        for rung in comparison.rungs
+    )
+    report, pictures = Report("Fits"), []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(report, "picture", lambda draw, *_: pictures.append(draw()))
+        fits._add_curves(report, dataclasses.replace(comparison, rungs=tuple(rungs)), None)
+    (figure,) = pictures
+    lines = {str(line.get_label()): line for line in figure.axes[0].get_lines()}
+    velocity, force = (np.asarray(part, float) for part in lines["linear"].get_data())
+    known = np.isfinite(force)
+    rate = comparison["linear"].parameters[0].value
+    np.testing.assert_allclose(force[known], rate * velocity[known] + 30.0, rtol=1e-6)
+    assert "of 20 N, and each law with the difference of its own: gas" in " ".join(figure.get_supxlabel().split())
 
 
 @pytest.mark.exhaustive
