@@ -115,7 +115,7 @@ def fit(
     with job(screen, "fit", output, report, resume=resume) as work:
         with screen.stage("Reading the records"):
             raw = reading.raw(files) if table is None else records_of(screen, table)
-        sound, found = reading.checked(screen, raw, refuse=True)
+        sound, found = reading.checked(screen, raw, refuse=True, machine=options["rig"])
         runs = reading.processed(sound)
         _, held = split(runs, held_out)
         groups, divided = grouped(runs, group_by)

@@ -80,9 +80,12 @@ class Reading:
         steps = self.processing()
         return runs.process(**steps) if steps else runs
 
-    def checked(self, screen: Screen, runs: BenchSet, *, refuse: bool = False) -> tuple[BenchSet, Preflight]:
-        """The records without an error, and the findings on all of them but those that the processing answers."""
-        answered = (() if self.keep_rest else _CUT_OFF) + (("delay",) if "delay" in self.steps.given else ())
+    def checked(
+        self, screen: Screen, runs: BenchSet, *, refuse: bool = False, machine: Sequence[str] = ()
+    ) -> tuple[BenchSet, Preflight]:
+        """The records without an error, and the findings on all but those that processing or the machine answers."""
+        late = "delay" in self.steps.given or "delay" in machine
+        answered = (() if self.keep_rest else _CUT_OFF) + (("delay",) if late else ())
         with screen.stage("Checking the records"):
             found = bench.preflight(runs).without(answered)
         self._show(screen, found)

@@ -19,7 +19,7 @@ from jaxdamp.bench import BenchRun, RideRecord, as_runs, usable
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.comparison import NAMED, AbstractComparison, naming_only, side_by_side
 from jaxdamp.identify.fitting import NUMERICAL, fit
-from jaxdamp.identify.held_out import on_records, without_parts
+from jaxdamp.identify.held_out import on_records, too_few_points, without_parts
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import OFFSET, Machine, absent_paths, started_machine
 from jaxdamp.identify.model import Model, on_rig, rig_of
@@ -281,8 +281,7 @@ def _outcome(
         else:
             judged = None if isinstance(start, LearntStart) else without_parts(result, in_time=in_time)
         if judged is None and several and all(run.of_points for run in runs):
-            numbers, points = len(result.parameters), sum(map(len, runs))
-            return Failure(name, f"It has {numbers} numbers for {points} points, which cannot be judged beside others.")
+            return Failure(name, too_few_points(runs, len(result.parameters)))
         _ = result.error_shares  # which the table needs, computed here beside those of other laws
     except NUMERICAL as error:
         return Failure(name, str(error))

@@ -89,10 +89,21 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
     return HeldOut(*errors([*samples, *beyond]), words)
 
 
+def _most_numbers(runs: Sequence[BenchRun]) -> int:
+    """So many numbers of a law at most as there are points of tables without a quarter of them."""
+    points = sum(map(len, runs))
+    return points - -(-points // PARTS)
+
+
 def _are_too_few(runs: Sequence[BenchRun], numbers: int) -> bool:
     """Whether points of tables, without a quarter of them, are fewer than the numbers of a law."""
-    points = sum(map(len, runs))
-    return all(run.of_points for run in runs) and numbers > points - -(-points // PARTS)
+    return all(run.of_points for run in runs) and numbers > _most_numbers(runs)
+
+
+def too_few_points(runs: Sequence[BenchRun], numbers: int) -> str:
+    """Why a law is not judged on points of tables."""
+    remedy = f"measure more points, or take a law with {_most_numbers(runs)} numbers or fewer."
+    return f"{sum(map(len, runs))} points are too few for its {numbers} numbers: {remedy}"
 
 
 def _quarters(runs: Sequence[BenchRun], *, alike: bool) -> str:

@@ -301,7 +301,7 @@ def _scatter(problem: Problem, records: Sequence[Record], squares: float) -> tup
     largest = max(white_noise(problem.runs[record.number].velocity, FINE) for record in records)
     sentence = (
         f"At least {100 * share:.0f} % of the squared residual come from noise of the velocity, up to {largest:.2g}"
-        " m/s, which makes the fitted damping too small: average more samples (a smaller `samples_per_cycle`), or leave"
+        " m/s, which makes the fitted damping too small: average more, such as by `samples_per_cycle=50`, or leave"
         " the channel out, so that the velocity is derived from the stroke."
     )
     return [sentence], SCATTER

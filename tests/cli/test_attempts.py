@@ -6,11 +6,22 @@ import numpy as np
 import pytest
 
 from jaxdamp import export, plots, rig
+from jaxdamp.bench import SineTest, VirtualDyno
 from jaxdamp.dampers import AbstractDamper, Bilinear, Linear
 from jaxdamp.export import from_json
 from jaxdamp.identify import ladder
 
 from .invoking import jaxdamp
+
+
+def test_a_delay_that_is_fitted_is_no_finding_of_the_preflight(tmp_path: Path) -> None:
+    """It advised the option that the command had."""
+    dyno = VirtualDyno(Bilinear(2600.0, 1200.0), sampling_rate=500.0, force_noise=2.0, force_delay=0.004)
+    dyno.run([SineTest(0.01, f, name=f"{f:g} Hz") for f in (1.0, 2.0, 4.0)]).write(tmp_path / "late")
+    words = ("fit", tmp_path / "late", "--law", "bilinear", "--out", tmp_path / "fit")
+    assert "fit with --rig delay" in " ".join(jaxdamp(*words).output.split())
+    words = (*words[:-1], tmp_path / "delayed", "--rig", "delay")
+    assert "Preflight" not in jaxdamp(*words).output
 
 
 def test_a_law_that_cannot_be_started_or_fitted_is_named_and_the_others_are_complete(

@@ -93,6 +93,7 @@ def test_verdict_object_file_and_page_never_disagree(situation: str, tmp_path: P
         ("Argument `bounds['rate']` must increase.", "Option --bound of 'rate' must"),
         ("Argument `law.rate` must be above 0.", "law.rate must"),
         ("Pass `dt=0.0005`, or more.", "--dt 0.0005,"),
+        ("Average more samples, such as by `samples_per_cycle=50`.", "such as by --samples-per-cycle 50."),
         (
             "Set them equal first, with `jaxdamp.parameters.replace(..., {'damper.rebound_rate': ...})`.",
             "with damper.rebound_rate = NUMBER below [parameters] of VEHICLE.toml",
@@ -103,7 +104,7 @@ def test_the_command_line_names_options_instead_of_calls(
     monkeypatch: pytest.MonkeyPatch, said: str, option: str
 ) -> None:
     monkeypatch.setitem(application.own_words(), "bounds", "Option --bound")
-    for argument in ("units", "columns", "dt"):
-        monkeypatch.setitem(application.own_words(), argument, f"Option --{argument}")
+    for argument in ("units", "columns", "dt", "samples_per_cycle"):
+        monkeypatch.setitem(application.own_words(), argument, f"Option --{argument.replace('_', '-')}")
     words = in_command_line(said)
     assert option in words and "`" not in words and "process(" not in words
