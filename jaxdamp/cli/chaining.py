@@ -53,7 +53,7 @@ def report(
     Arguments:
         law: names of laws to fit, see "jaxdamp laws": "linear,besinger"; or "all"; six that suit the records if left
             out.
-        minimise: comfort, travel, grip, or the name of a ride metric.
+        minimise: the goal: comfort, travel, grip, or the name of a ride metric.
     """
     names, make = law_names(law), parse_vehicle(vehicle)
     if road.startswith("white"):

@@ -75,8 +75,8 @@ def export_command(
 
     Arguments:
         law: a law as JSON, such as best_law.json of jaxdamp fit; or a vehicle, for c and fmu.
-        to: adams, assetto-corsa, c, carsim, csv, fmu or matlab.
-        part: whole, or controller for the controller of a vehicle alone, as c or fmu.
+        to: the format: adams, assetto-corsa, c, carsim, csv, fmu or matlab.
+        part: of a vehicle, as c or fmu: whole, or controller for its controller alone.
         velocities: of a table, FROM:TO:POINTS [m/s], positive in rebound; those the law was fitted to, or -1:1:41.
         command: of a table, what is set on the damper, such as clicks or a coil current; that of the law if left out.
         show_units: units of a table as csv: SI, metric (N, mm/s), imperial (lbf, in/s), or a force and a velocity such

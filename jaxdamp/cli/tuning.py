@@ -110,7 +110,7 @@ def tune_command(
 
     Arguments:
         road: iso:A to iso:H, white:A to white:H, bump:HEIGHT:LENGTH [m], or a file of position, height.
-        minimise: comfort, travel, grip, or the name of a ride metric.
+        minimise: the goal: comfort, travel, grip, or the name of a ride metric.
         roads: realisations of an iso road, driven side by side; their mean counts.
         baseline: to compare with: another law, or another tuning's vehicle.json, as JSON.
     """
@@ -229,7 +229,7 @@ def sweep_command(
     Arguments:
         road: iso:A to iso:H, white:A to white:H, bump:HEIGHT:LENGTH [m], or a file of position, height.
         over: axes.
-        metric: comfort, travel, grip, or names of ride metrics.
+        metric: what is computed: comfort, travel, grip, or names of ride metrics.
         limit: limits.
         command: what is set on the dampers, such as clicks or a coil current; that of their laws if left out.
         baseline: to compare with: another law, or another tuning's vehicle.json, as JSON.

@@ -1,5 +1,6 @@
 import csv
 import json
+import re
 from importlib.metadata import version
 from pathlib import Path
 
@@ -54,6 +55,14 @@ def test_vehicles_are_listed_with_a_line_of_meaning() -> None:
 def test_help_of_a_command_names_its_options(command: str, options: str) -> None:
     text = jaxdamp(command, "--help").output
     assert [option for option in options.split() if option not in text] == []
+
+
+@pytest.mark.parametrize("words", ["export adams whole", "tune comfort", "sweep comfort", "report comfort"])
+def test_help_writes_words_as_they_are_given(words: str) -> None:
+    """They are refused with a capital letter, with which sentences begin."""
+    command, *names = words.split()
+    text = re.findall(r"[\w-]+", jaxdamp(command, "--help").output)
+    assert {*names} <= {*text} and not {name.capitalize() for name in names} & {*text}
 
 
 def test_laws_lists_every_law_with_a_line() -> None:
