@@ -292,10 +292,11 @@ def _in_scenarios(
 ) -> tuple[ScenarioValues | None, list[dict[str, float]]]:
     """All metrics in every scenario, and those that are reported: joined by the true risk, not by a smooth one."""
     measured, names = task.measured, task.units
-    if not isinstance(measured.ride, ScenarioRide):
-        return None, [{name: values[name] for name in names} for values in (before, after)]
-    sides = [{n: np.asarray(x, float) for n, x in measured.each(car).items()} for car in (task.vehicle, tuned)]
-    return ScenarioValues(measured.scenario_names, *sides), [measured.reported(side) for side in sides]
+    each, reported = None, [before, after]
+    if isinstance(measured.ride, ScenarioRide):
+        sides = [{n: np.asarray(x, float) for n, x in measured.each(car).items()} for car in (task.vehicle, tuned)]
+        each, reported = ScenarioValues(measured.scenario_names, *sides), [measured.reported(side) for side in sides]
+    return each, [{name: values[name] for name in names} for values in reported]
 
 
 def _relaxation(task: DesignTask[V], ended: Ended, limits: tuple[Sequence[Limit], Sequence[Limit]]) -> str:

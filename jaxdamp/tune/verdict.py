@@ -27,6 +27,7 @@ PRICED = (  # kinds of channels whose rise is a price: of body, travel and tyres
     ChannelKind.STROKE, ChannelKind.TYRE_LOAD, ChannelKind.RELATIVE_TYRE_LOAD,
 )  # fmt: skip
 NOTICED = 0.05  # percent: smaller changes are none
+SAME = 1e-3  # relative: nearer changes are those of one thing, as of the tyre load and its coefficient
 
 
 def relative_change(before: float, after: float) -> float | None:
@@ -160,7 +161,7 @@ def _price(result: "TuneResult[AbstractVehicle]") -> tuple[float, str]:
     worst = (NOTICED, "")
     for name in result.units:
         change, metric = mean_change(result, name), metrics.get(name)
-        if change is None or name in named or any(x is not None and np.isclose(change, x, 1e-6) for x in changes):
+        if change is None or name in named or any(x is not None and np.isclose(change, x, SAME) for x in changes):
             continue
         if metric is None or (metric.channel not in limited and _has_price(metric, result.start)):
             worst = max(worst, (change, name))

@@ -72,6 +72,8 @@ def test_the_mean_over_white_roads_has_the_closed_form_optimum_and_the_worst_cas
         assert result.parameters[0].after == pytest.approx(best, rel=1e-5), risk
     assert result.scenarios is not None and result.scenarios.names == ("C", "D")
     assert result.scenario_table().records()[1]["scenario"] == "D"
+    shown = [row["metric"] for row in result.table().records()]
+    assert shown == [m.name for m in LINEAR.ride_metrics if m.name in shown] and len(shown) > 3  # as of one road
 
 
 def test_limits_hold_in_every_scenario() -> None:
