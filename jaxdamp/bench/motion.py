@@ -157,15 +157,19 @@ def white_noise(values: Samples, order: int = 3) -> float:
     return float(np.median(np.abs(differences)) / (0.6745 * np.sqrt(math.comb(2 * order, order))))
 
 
-def savitzky_golay_weights(half: int, order: int, derivative: int) -> Float[np.ndarray, "samples columns"]:
-    """Of 2 half + 1 neighbouring samples, a column for each, in the least-squares polynomial around the middle one.
+def savitzky_golay_factors(
+    half: int, order: int, derivative: int
+) -> tuple[Float[np.ndarray, "places coefficients"], Float[np.ndarray, "coefficients samples"]]:
+    """Of 2 half + 1 neighbouring samples the least-squares polynomial, in two factors.
 
-    A row for each place in the window gives the value there, or with `derivative` 1 the slope by sample.
+    The second one gives its coefficients from the samples, the first one the value at each place in the window from
+    the coefficients, or with `derivative` 1 the slope by sample. Their product is not formed: of a window of ten
+    thousand samples it would take 800 MB.
     """
     places = np.arange(-half, half + 1) / max(half, 1)
     powers = np.vander(places, order + 1, increasing=True)
     at = powers if derivative == 0 else np.arange(order + 1) * np.pad(powers, ((0, 0), (1, 0)))[:, :-1] / max(half, 1)
-    return at @ np.linalg.pinv(powers)
+    return at, np.linalg.pinv(powers)
 
 
 def savitzky_golay(values: Samples, window: int, order: int, derivative: int = 0) -> Samples:
@@ -174,9 +178,10 @@ def savitzky_golay(values: Samples, window: int, order: int, derivative: int = 0
     `scipy.signal.savgol_filter` gives the same, and takes half a second to import.
     """
     half = window // 2
-    weights = savitzky_golay_weights(half, order, derivative)
-    inner = np.correlate(values, weights[half], "valid")
-    return np.concatenate([weights[:half] @ values[:window], inner, weights[half + 1 :] @ values[-window:]])
+    at, fitted = savitzky_golay_factors(half, order, derivative)
+    inner = np.correlate(values, at[half] @ fitted, "valid")
+    ends = at[:half] @ (fitted @ values[:window]), at[half + 1 :] @ (fitted @ values[-window:])
+    return np.concatenate([ends[0], inner, ends[1]])
 
 
 NEAR_PEAK = 0.98  # of the peak velocity, beyond which samples count as taken at the peak

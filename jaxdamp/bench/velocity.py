@@ -17,7 +17,7 @@ from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import clock
-from jaxdamp.bench.motion import Samples, cycle_instants, dominant_frequency, savitzky_golay, savitzky_golay_weights
+from jaxdamp.bench.motion import Samples, cycle_instants, dominant_frequency, savitzky_golay, savitzky_golay_factors
 from jaxdamp.bench.spectrum import Spectrum, spectrum_of
 
 
@@ -234,7 +234,8 @@ def _window(
 def _response(half: int, order: int, omega: Float[np.ndarray, " lines"]) -> Float[np.ndarray, " lines"]:
     """Gain of the differentiating filter at angular frequencies per sample; the ideal gain is ω itself."""
     coefficients = np.zeros(2 * half)
-    coefficients[1 : half + 1] = savitzky_golay_weights(half, order, 1)[half, half + 1 :]
+    at, fitted = savitzky_golay_factors(half, order, 1)
+    coefficients[1 : half + 1] = at[half] @ fitted[:, half + 1 :]
     size = 32 * half
     return np.interp(omega, 2 * np.pi * np.arange(size // 2 + 1) / size, -2 * np.fft.rfft(coefficients, size).imag)
 

@@ -1,9 +1,11 @@
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.signal import savgol_coeffs, savgol_filter
 
 from jaxdamp.bench import RandomTest, estimate_velocity
-from jaxdamp.bench.motion import savitzky_golay, savitzky_golay_weights
+from jaxdamp.bench.motion import savitzky_golay, savitzky_golay_factors
 
 
 def _error(estimate: np.ndarray, truth: np.ndarray) -> float:
@@ -139,9 +141,24 @@ def test_the_filter_is_that_of_scipy(window, order, derivative, rng):
     expected = np.asarray(savgol_filter(values, window, order, deriv=derivative))
     ours = savitzky_golay(values, window, order, derivative)
     np.testing.assert_allclose(ours, expected, atol=1e-9 * np.max(np.abs(expected)))
-    weights = savitzky_golay_weights(window // 2, order, derivative)[window // 2]
+    at, fitted = savitzky_golay_factors(window // 2, order, derivative)
+    weights = at[window // 2] @ fitted
     coefficients = np.asarray(savgol_coeffs(window, order, deriv=derivative, use="dot"))
     np.testing.assert_allclose(weights, coefficients, atol=1e-9 * np.max(np.abs(coefficients)))
+
+
+def test_a_long_window_takes_memory_by_its_length_alone(rng):
+    """One cycle of ten seconds at 1 kHz took 800 MB: a number for each pair of samples of the longest window."""
+    time = np.arange(2001) * 1e-3
+    stroke = 0.01 * np.sin(np.pi * time) + 1e-5 * rng.standard_normal(time.size)
+    tracemalloc.start()
+    try:
+        estimate_velocity(time, stroke)
+        savitzky_golay(stroke, 2001, 4, 1)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 1000 * 8 * time.size  # 16 MB
 
 
 def _slow_and_fast(t):
