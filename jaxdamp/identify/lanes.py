@@ -171,12 +171,21 @@ def _went_on(end: SearchLanes, lanes: Int[np.ndarray, " some"], again: SearchLan
 
 
 def judged(lanes: Lanes, end: SearchLanes, depends: Dependence | None) -> dict[str, Any]:
-    """Numbers of each damper with standard errors, errors of it and of each of its records, and drift of states."""
+    """Numbers of each damper with standard errors, errors of it and of each of its records, and drift of states.
+
+    All are NaN for a damper on whose records the law ended without finite forces and derivatives.
+    """
     count, free = end.y.shape
+    finite = np.ones(count, bool)
     percent, rmse, drift = (np.zeros(count) for _ in range(3))
     values, by_record, noise = np.zeros((count, free)), list[np.ndarray](), list[_Noise]()
     for i, problem in enumerate(lanes.problems):
         here = lanes.searches[i].here(end.y[i])
+        if not np.all(np.isfinite(here.whole)):
+            finite[i], nothing = False, np.zeros((free, free))
+            noise.append(_Noise(here.units, nothing, 0.0, nothing))
+            by_record.append(np.full(len(problem.runs), np.nan))
+            continue
         values[i] = here.values
         variances = lanes.variances(i, here.whole[:, -1], free if depends is None else depends.size / count)
         variances /= problem.level**2
@@ -192,6 +201,8 @@ def judged(lanes: Lanes, end: SearchLanes, depends: Dependence | None) -> dict[s
         percent[i], rmse[i], each = _errors(lanes, i, here, settled=bool(drift[i] <= DRIFT))
         by_record.append(each)
     errors_of_numbers = _standard_errors(noise, depends)
+    for numbers in (values, errors_of_numbers, percent, rmse):
+        numbers[~finite] = np.nan
     named = {"values": values, "standard_errors": errors_of_numbers, "fit_percent": percent, "rmse": rmse}
     return named | {"record_rmse": tuple(by_record), "drift": drift}
 

@@ -13,6 +13,7 @@ from jaxtyping import Float
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
 from jaxdamp._settings import with_defaults
+from jaxdamp._status import Status
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun
 from jaxdamp.blocks import Cluster
@@ -32,6 +33,7 @@ from jaxdamp.identify.many_records import (
     by_name,
     fitted_records,
     left_out_in_words,
+    warn_of_left_out,
 )
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.model import initial_state_for, own_names, rig_of
@@ -43,6 +45,7 @@ from jaxdamp.parameters import FreeParameters, name_patterns
 from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, SearchLanes, least_squares_on_host
 
 
+NOT_FINITE = "its law has no finite forces and derivatives over its records: start from another law"
 STARTED_FROM = 12  # dampers whose records give the start of a law class
 
 
@@ -92,7 +95,8 @@ def fit_many(
 
     Returns:
         The laws with their parameters, standard errors, scores and a status each; dampers that differ from the others
-        by their error or their parameters are named in `remarks`.
+        by their error or their parameters are named in `remarks`, and so are those left out because the law has no
+        finite force over their records.
 
     Raises:
         ValueError: no dampers; a record with an error; records of one damper that contradict each other; names
@@ -126,7 +130,18 @@ def fit_many(
         refuse_several_laws(begin.model, runs, how, f"dampers[{name!r}]")
     lacking = [[run.name for run in runs if run not in records[name]] for name, runs in given.items()]
     many = fitted_together(begin, records, how, shared, stated)
-    return dataclasses.replace(many, reasons=tuple(map(left_out_in_words, lacking)))
+    return _with_reasons(many, begin.law, [left_out_in_words(names) for names in lacking], together=bool(shared))
+
+
+def _with_reasons(many: ManyFits, law: AbstractDamper, lacking: Sequence[str], *, together: bool) -> ManyFits:
+    """The same with why dampers or records are left out; refused where no damper can be fitted without one of them."""
+    left = [name for name, reason in zip(many.names, many.reasons, strict=False) if reason]
+    if left and (together or len(left) == len(many)):
+        must = "give finite forces and derivatives over the records of all dampers"
+        _checks.refuse("law", must, f"{law}, which does not for {', '.join(left)}", "Start from another law.")
+    warn_of_left_out(left, len(many))
+    own = many.reasons or ("",) * len(many)
+    return dataclasses.replace(many, reasons=tuple(a or b for a, b in zip(own, lacking, strict=True)))
 
 
 @one_thread()
@@ -184,8 +199,11 @@ def _side_by_side(
     )
     if depends is not None:
         vector = depends.start(end.y)
-    return judged(lanes, end, depends) | {
-        "status": tuple(end.status),
+    ends = judged(lanes, end, depends)
+    without = np.isnan(ends["rmse"])
+    return ends | {
+        "status": tuple(Status.LEFT_OUT if no else one for no, one in zip(without, end.status, strict=True)),
+        "reasons": tuple(NOT_FINITE * bool(no) for no in without),
         "steps": end.steps,
         "vector": vector,
         "share_left_out": np.array([problem.share_left_out for problem in lanes.problems]),

@@ -16,11 +16,18 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._status import Status
-from jaxdamp._warned import warn
 from jaxdamp.bench import BenchRun, DamperRecords
 from jaxdamp.blocks import AbstractWork, Blocks, BlockStore, Cluster, Variable, fill, stored_blocks
 from jaxdamp.identify.contradicting import refuse_several_laws
-from jaxdamp.identify.many_records import AllRecords, Options, begun_on, code_of, fitted_records, left_out_in_words
+from jaxdamp.identify.many_records import (
+    AllRecords,
+    Options,
+    begun_on,
+    code_of,
+    fitted_records,
+    left_out_in_words,
+    warn_of_left_out,
+)
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.preparing import Beginning
 from jaxdamp.identify.starting import Start
@@ -118,7 +125,9 @@ class DamperFits(AbstractWork):
 
 
 def _row(many: ManyFits, place: int) -> Row:
-    """What is stored of a damper, errors of its records as a list."""
+    """What is stored of a damper, errors of its records as a list; why, of one that is left out."""
+    if many.status[place] is Status.LEFT_OUT:
+        return {"reason": many.reasons[place]}
     row: Row = {
         name: getattr(many, name)[place] for name in ("values", "standard_errors", "fit_percent", "rmse", "steps")
     }
@@ -182,11 +191,7 @@ def _found(store: BlockStore, rows: np.ndarray, names: tuple[str, ...]) -> dict[
         del found["bias"]
     status = tuple(Status[text.upper()] if text else Status.LEFT_OUT for text in found["status"])
     reasons = [str(reason) for reason in found.pop("reason")]
-    left = [name for name, reason in zip(names, reasons, strict=True) if reason]
-    if left:
-        some = ", ".join(left[:5]) + ", …" * (len(left) > 5)
-        words = f"{len(left)} of {len(names)} dampers were left out: {some}. `many.remarks` says why."
-        warn(words)
+    warn_of_left_out([name for name, reason in zip(names, reasons, strict=True) if reason], len(names))
     errors, without = zip(*map(_of_records, found["record_rmse"]), strict=True)
     pending = ["its block is not done yet" * (s is Status.LEFT_OUT) for s in status]
     said = tuple(next(filter(None, words), "") for words in zip(reasons, without, pending, strict=True))

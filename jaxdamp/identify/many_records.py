@@ -14,6 +14,7 @@ from jaxtyping import PyTree
 from jaxdamp import _checks
 from jaxdamp._settings import part
 from jaxdamp._types import Scalar, State
+from jaxdamp._warned import warn
 from jaxdamp.bench import BenchRun, DamperRecords, as_runs, usable
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.machine import Machine
@@ -62,6 +63,13 @@ def fitted_records(name: str, runs: tuple[BenchRun, ...], options: Options) -> t
 def left_out_in_words(names: Sequence[str]) -> str:
     """What is said of a damper some of whose records were left out because of an error; empty if none were."""
     return f"it was fitted without {', '.join(map(repr, names))}: records with an error" if names else ""
+
+
+def warn_of_left_out(names: Sequence[str], count: int) -> None:
+    """Warn of dampers that have no fit, some of so many."""
+    if names:
+        some = ", ".join(names[:5]) + ", …" * (len(names) > 5)
+        warn(f"{len(names)} of {count} dampers were left out: {some}. `many.remarks` says why.")
 
 
 def begun_on(law: Start, runs: Sequence[BenchRun], options: Options, shared: Iterable[str] = ()) -> Beginning:

@@ -286,9 +286,13 @@ def _limited(p: Parameter, limits: tuple[float, float] | None, *, move: bool) ->
     """The domain of a parameter within extra limits."""
     if limits is None:
         return p.domain
+    value, ends = np.asarray(p.value), (max(limits[0], p.domain.lower), min(limits[1], p.domain.upper))
+    least, most = np.array(ends, value.dtype)  # may be one number in its precision
+    if not least < most:
+        must, remedy = f"leave a range where {p.path} is {p.domain.name}", "Widen them, or `freeze` it instead."
+        _checks.refuse(f"bounds[{p.path!r}]", must, limits, remedy)
     limited = ordered_interval if p.domain.ordered else interval
-    domain = limited(max(limits[0], p.domain.lower), min(limits[1], p.domain.upper))
-    value = np.asarray(p.value)
+    domain = limited(*ends)
     if not move and not np.all((value > domain.lower) & (value < domain.upper)):
         remedy = "Start inside the bounds or widen them."
         _checks.refuse(p.path, f"start strictly {domain.name} [{p.unit}]", value, remedy)

@@ -1,12 +1,17 @@
 """A law that cannot be fitted costs a comparison that law alone; a wrong call costs the whole of it."""
 
+from typing import final
+
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxdamp.dampers import AbstractDamper, Bilinear, Linear
-from jaxdamp.identify import Rung, compare, default_ladder, fit, fit_each, ladder
-from jaxdamp.parameters import get
+from jaxdamp._types import Number, Scalar, ScalarLike
+from jaxdamp.bench import SineTest, VirtualDyno
+from jaxdamp.dampers import AbstractDamper, AbstractMemoryless, Bilinear, Linear
+from jaxdamp.identify import Rung, compare, default_ladder, fit, fit_each, fit_many, ladder
+from jaxdamp.parameters import get, parameter, positive
 
 
 TRUTH = Bilinear(2600.0, 1200.0)
@@ -66,3 +71,30 @@ def test_a_start_that_cannot_be_made_is_a_failure_of_that_law(sines, monkeypatch
     assert comparison.failed[0].reason == "No start can be computed from these records: no velocity"
     with pytest.raises(ValueError, match="No start can be computed"):
         fit(default_ladder(runs, ["table"])["table"], runs)
+
+
+@final
+class Seized(AbstractMemoryless):
+    """F = c v, which nobody knows beyond 0.3 m/s."""
+
+    rate: Number = parameter("N s/m", "c", positive)
+
+    def force_velocity(self, v: ScalarLike) -> Scalar:
+        return jnp.where(jnp.abs(v) < 0.3, self.rate * v, jnp.nan)
+
+
+@pytest.mark.filterwarnings("ignore:1 of 2 dampers were left out")
+@pytest.mark.parametrize("rate", [150.0, 1000.0])  # Hz, without and with means of samples
+def test_one_damper_of_many_where_the_law_has_no_force_is_left_out(rate):
+    """It stopped the others, or had the start as its numbers, with which no damper stood out any more."""
+    dyno = VirtualDyno(Linear(1500.0), sampling_rate=rate, force_noise=5.0)
+    slow, fast = (list(dyno.run(SineTest(0.02, f, cycles=3))) for f in (1.0, 3.0))
+    many = fit_many(Seized(1000.0), {"slow": slow, "fast": fast})
+    assert float(get(many["slow"], "rate")) == pytest.approx(1500.0, rel=0.01)
+    assert many.warnings == (f"fast: it was left out: {many.reasons[1]}",) and "no finite force" in many.reasons[1]
+    assert "1 of them left out: mean fit 9" in many.summary
+    with pytest.raises(ValueError, match="fast"):
+        many["fast"]
+    for dampers, shared in (({"fast": fast}, []), ({"slow": slow, "fast": fast}, ["rate"])):
+        with pytest.raises(ValueError, match=r"over the records of all dampers, but is Seized.* does not for fast"):
+            fit_many(Seized(1000.0), dampers, shared=shared)

@@ -79,6 +79,7 @@ def test_build_is_differentiable():
             r"`rebound_rate` must start strictly between 3000 and 4000 \[N s/m\], but is 2600\.0\. Start inside",
         ),
         ({"bounds": {"rebound_rate": (0.0, np.inf)}}, r"`bounds\['rebound_rate'\]` must be two finite numbers"),
+        ({"bounds": {"rebound_rate": (-5.0, -1.0)}}, "leave a range where rebound_rate is positive, but is (-5"),
         ({"bounds": {"rebound_rate": (4000.0, 3000.0)}}, "in increasing order, but is (4000.0, 3000.0)"),
     ],
 )
