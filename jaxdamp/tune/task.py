@@ -1,9 +1,11 @@
 """The task of a search over designs of a vehicle: objectives, free parameters, limits and shapes; its doubts."""
 
+import dataclasses
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import Generic, NamedTuple, final
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -13,27 +15,33 @@ from jaxdamp._pieces import piece
 from jaxdamp._settings import part
 from jaxdamp.dampers import RangeUse, has_fitted_range
 from jaxdamp.metrics import Metric, current_name
+from jaxdamp.parameters import FreeParameters
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import (
     DEVIATIONS,
     CoarseStepWarning,
+    Exponential,
     Ride,
     far_outside,
     over_runs,
     range_sentences,
     stationary_notes,
+    substeps_needed,
 )
 from jaxdamp.solve import Evaluation, Region
 from jaxdamp.tune.limits import Limit, LimitRange, limit_ends, limit_ranges, scaled, span_from
 from jaxdamp.tune.measuring import BatchProgram, Computed, Measurement
 from jaxdamp.tune.objective import Function, Targets, goal_limits, goal_objective, objective_of
-from jaxdamp.tune.ranges import search_range, start_points
+from jaxdamp.tune.ranges import SearchRange, search_range, start_points
 from jaxdamp.tune.result import V
 from jaxdamp.tune.scenario_ride import in_condition
 from jaxdamp.tune.scenarios import Condition, Road, Scenario, Scenarios
-from jaxdamp.tune.settings import LEAST, RUN, Settings
+from jaxdamp.tune.settings import LEAST, RUN, Run, Settings
 from jaxdamp.tune.shape import ShapeNumbers
 from jaxdamp.vehicles import AbstractVehicle
+
+
+USUAL_STEP = 1e-3  # s, of a run that names none
 
 
 def step_notes(start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable[[AbstractVehicle], Ride]) -> list[str]:
@@ -53,6 +61,39 @@ def step_notes(start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable
             "this result."
         )
     return notes
+
+
+def stepped_for_choices(run: Run, space: SearchRange) -> Run:
+    """The run with as many substeps as the steepest of the choices needs, tried one by one, and all ends together.
+
+    A search takes the substeps that its start needs, and its steps are small; a choice may be far from there.
+    """
+    engine = Exponential() if run["engine"] is None else run["engine"]
+    if not space.is_choice.any() or not isinstance(engine, Exponential) or engine.substeps is not None:
+        return run
+    dt = run["dt"] or engine.spacing or USUAL_STEP
+    designs = [space.start]
+    for i, choice in enumerate(space.choices):
+        designs += [_replaced(space.start, {i: value}) for value in (() if choice is None else choice.values)]
+    for end in (0, -1):
+        designs.append(_replaced(space.start, {i: c.values[end] for i, c in enumerate(space.choices) if c is not None}))
+    needs = [_needed(space.free, design, dt) for design in designs]
+    return run if max(needs) == needs[0] else {**run, "engine": dataclasses.replace(engine, substeps=max(needs))}
+
+
+def _replaced(values: np.ndarray, others: Mapping[int, float]) -> np.ndarray:
+    """Some of the numbers replaced."""
+    values = values.copy()
+    values[list(others)] = list(others.values())
+    return values
+
+
+def _needed(free: FreeParameters, values: np.ndarray, dt: float) -> int:
+    """The substeps that a design needs; 1 for what no vehicle can be, or no step can follow."""
+    try:
+        return substeps_needed(free.build(jnp.asarray(values, free.values.dtype)), dt)
+    except ValueError:
+        return 1
 
 
 def outside_ranges(
@@ -127,6 +168,8 @@ class DesignTask(Generic[V]):
         _refuse_negative(self.allowed, self.objective.metrics)
         self.space = search_range(vehicle, settings["over"], settings["freeze"], settings["bounds"], settings["tie"])
         self.tolerance = DOUBLE if self.space.free.values.dtype == np.float64 else SINGLE
+        if not white:
+            self.run = stepped_for_choices(self.run, self.space)
         self.measured = Measurement(
             vehicle, road, self.objective, self.space.free,
             each=list(self.allowed), curves=ShapeNumbers.of(vehicle, settings["shape"], self.space.free), run=self.run,

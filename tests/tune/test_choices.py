@@ -57,6 +57,16 @@ def test_a_combination_without_a_number_comes_last() -> None:
     assert [row[-1] for row in result.combinations.table().rows] == ["met", "met", "no number"]
 
 
+def test_a_choice_that_needs_more_steps_than_the_start_is_driven_with_them() -> None:
+    """With the single step of the start the travel at 200 000 N s/m was no number, and 60 000 N s/m gave 1e149 m."""
+    bump, travel = roads.cosine_bump(0.05, start=0.1, duration=0.25), "working_space_rms"
+    run, rates = tune.Run(duration=0.5, dt=5e-3), (2500.0, 60e3, 200e3)
+    result = tune.minimise(travel, CAR, bump, over={"damper.rate": tune.Choice(rates)}, **run)
+    assert float(get(result.vehicle, "damper.rate")) == 200e3 and result.combinations is not None
+    alone = Ride(vehicles.presets.quarter_car_000(dampers.Linear(200e3)), bump, metrics=[travel], **run)
+    assert alone.substeps > 1 and result.after[travel] == pytest.approx(float(alone()[travel]), rel=1e-9)
+
+
 def test_clicks_are_chosen_and_swept() -> None:
     """A valley between two hills: every click is driven, where a descent would end at the nearer hill."""
     rates = [900.0, 2500.0, 1200.0, 300.0, 7000.0, 3500.0]
