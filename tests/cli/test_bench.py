@@ -183,7 +183,7 @@ def test_records_are_compared_by_a_setting_of_the_manifest(folder: Path, tmp_pat
     ],
 )
 def test_wrong_options_are_refused_in_words(words: tuple[str, ...], message: str, folder: Path, tmp_path: Path) -> None:
-    assert message in refused(tmp_path, "bench", folder, *words, "--out", tmp_path / "out")
+    assert message in refused(tmp_path, "bench", folder / "10mm_2Hz.csv", *words, "--out", tmp_path / "out")
 
 
 def test_records_with_errors_only_are_refused(folder: Path, tmp_path: Path) -> None:

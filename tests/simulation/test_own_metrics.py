@@ -121,14 +121,20 @@ def test_on_a_white_road_a_ride_is_stationary():
     white, sideways = roads.white("C", 20.0), Metric("sprung_acceleration", "rms", "Wd")
     chosen = ["rms_sprung_acceleration", Metric("stroke", "standard_deviation"), sideways]
     ride = Ride(CAR, white, metrics=chosen)
-    for rate in (2500.0, 4000.0):
+
+    @jax.jit
+    def of_the_linear_car(rate: float) -> list[jax.Array]:
         car = vehicles.presets.quarter_car_000(dampers.Linear(rate))
         linear = vehicles.with_weightings(vehicles.linearise(car), [("sprung_acceleration", "Wd")])
         rms = vehicles.stationary_rms(linear, white.velocity_psd)
-        expected = [rms[name] for name in ("sprung_acceleration", "stroke", "weighted_sprung_acceleration")]
+        return [rms[name] for name in ("sprung_acceleration", "stroke", "weighted_sprung_acceleration")]
+
+    for rate in (2500.0, 4000.0):
         values = ride({"damper.rate": rate})
         names = ("rms_sprung_acceleration", "standard_deviation_stroke", sideways.name)
-        assert [float(values[name]) for name in names] == pytest.approx([float(x) for x in expected], rel=1e-9)
+        assert [float(values[name]) for name in names] == pytest.approx(
+            [float(x) for x in of_the_linear_car(rate)], rel=1e-9
+        )
     everything = jax.eval_shape(Ride(CAR, white))
     assert "rms_sprung_acceleration" in everything and "peak_sprung_acceleration" not in everything
     with pytest.raises(ValueError, match="`metrics` must follow from an RMS on a white road, but is peak_sprung_acc"):

@@ -34,6 +34,12 @@ def found() -> tune.Sensitivity:
     return tune.sensitivity(METRICS, CAR, road, quantities={"speed": 20.0}, reach=0.6, hats=3, **RUN)
 
 
+@pytest.fixture(scope="module")
+def plain() -> tune.Sensitivity:
+    """Of a linear car on a white road, with second derivatives and without curves."""
+    return tune.sensitivity(METRICS[0], LINEAR, WHITE, over=["rate"], second_order=True)
+
+
 def test_derivatives_by_parameters_and_speed_agree_with_differences(found) -> None:
     ride = Ride(CAR, BUMP, metrics=METRICS, **RUN)
     centre = {p: jnp.asarray(x) for p, x in zip(found.parameters, found.point, strict=True) if p != "speed"}
@@ -78,7 +84,7 @@ def test_a_line_through_the_hats_is_a_damping_rate() -> None:
     np.testing.assert_allclose(forces, [-3.0, -2.0, -0.5, 0.0, 2.0, 3.0, 4.0], atol=1e-12)
 
 
-def test_second_derivatives_say_how_flat_an_optimum_is() -> None:
+def test_second_derivatives_say_how_flat_an_optimum_is(plain) -> None:
     """Closed form: the variance is a/c + b c, so that the RMS rises by 1 % where (r + 1/r)/2 = 1.01²."""
     best = vehicles.presets.quarter_car_000(dampers.Linear(BEST))
     found = tune.sensitivity(METRICS[0], best, WHITE, over=["rate"], second_order=True)
@@ -88,18 +94,16 @@ def test_second_derivatives_say_how_flat_an_optimum_is() -> None:
     assert scaled == pytest.approx(0.5, rel=1e-6)
     (sentence,) = found.flatness(METRICS[0])
     assert sentence == "rms_sprung_acceleration rises by 1 % at ±20 % along +1.00 damper.rate."
-    aside = tune.sensitivity(METRICS[0], LINEAR, WHITE, over=["rate"], second_order=True)
-    assert "has a slope here, 0.28 % for 1 %" in aside.flatness(METRICS[0])[0]
+    assert "has a slope here, 0.28 % for 1 %" in plain.flatness(METRICS[0])[0]
 
 
-def test_a_negative_value_rises_and_falls_as_a_positive_one() -> None:
+def test_a_negative_value_rises_and_falls_as_a_positive_one(plain) -> None:
     """A metric less a constant has its derivatives, and its minimum."""
 
     def below(values: Mapping[str, jax.Array]) -> jax.Array:
         return values[METRICS[0]] - 3.0
 
     found = tune.sensitivity(below, LINEAR, WHITE, over=["rate"], metrics=METRICS[:1], second_order=True)
-    plain = tune.sensitivity(METRICS[0], LINEAR, WHITE, over=["rate"], second_order=True)
     share = plain.values[METRICS[0]] / abs(found.values["below"])
     assert found.values["below"] < 0.0
     assert found.elasticities("below")["damper.rate"] == pytest.approx(
@@ -151,9 +155,11 @@ def test_wrong_uses_are_refused(change, message) -> None:
     arguments = {"metric": METRICS[0], "vehicle": LINEAR, "road": BUMP} | RUN | change
     with pytest.raises(ValueError, match=message):
         sensitivity(**arguments)
-    plain = tune.sensitivity(METRICS[0], LINEAR, WHITE, over=["rate"])
+
+
+def test_what_was_not_computed_is_refused(found, plain) -> None:
     with pytest.raises(ValueError, match="have second derivatives"):
-        plain.flatness(METRICS[0])
+        found.flatness(METRICS[0])
     with pytest.raises(ValueError, match="must have curves"):
         plain.curve_table()
 
