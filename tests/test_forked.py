@@ -1,5 +1,6 @@
 """A process that was forked while JAX was at work is told so, instead of waiting for ever."""
 
+import functools
 import os
 import signal
 import subprocess
@@ -15,12 +16,18 @@ from jaxdamp.dampers import Linear, Table
 
 LAW, TIME = Linear(1500.0), np.linspace(0.0, 1.0, 11)
 CAR, ROAD = vehicles.presets.quarter_car_000(LAW), roads.step(0.01)
-RIDE = Ride(CAR, ROAD, metrics=["rms_sprung_acceleration"], duration=1.0)
+
+
+@functools.cache  # made before the fork, and not while tests are collected
+def ride() -> Ride:
+    return Ride(CAR, ROAD, metrics=["rms_sprung_acceleration"], duration=1.0)
+
+
 CALLS = {
     "respond": lambda: respond(LAW, TIME, 0.0 * TIME),
     "simulate": lambda: simulate(CAR, ROAD, duration=1.0),
-    "ride": RIDE,
-    "sweep": lambda: sweep(RIDE, {"sprung_mass": [300.0, 400.0]}),
+    "ride": lambda: ride()(),
+    "sweep": lambda: sweep(ride(), {"sprung_mass": [300.0, 400.0]}),
     "fit": lambda: identify.fit(Linear, []),
     "a law": lambda: Table([-1.0, 0.0, 1.0], [-900.0, 0.0, 1500.0]),
     "a vehicle": vehicles.presets.half_car_002,
@@ -40,6 +47,7 @@ CALLS = {
 def _in_a_forked_process(call):
     """The exit code: 0 where it was refused with the remedy, 2 where the call went through, below 0 where it hung."""
     respond(LAW, TIME, 0.0 * TIME)
+    ride()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of JAX and Python, which do not say what to do
         child = os.fork()
