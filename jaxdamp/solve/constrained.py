@@ -148,6 +148,7 @@ class SequentialQuadratic:
         improvement: of the scaled objectives, that a search may leave at its end.
         rounding: error of the scaled objectives.
         feasible: violation of a scaled limit up to which the penalty does not grow; infinite for a constant penalty.
+        share: of the sum of several objectives in what is minimised beside the largest excess.
 
     Source: Nocedal, Wright, Numerical Optimization, 2nd edition, sections 18.5 (trust region, exact penalty) and 17.2.
     """
@@ -158,6 +159,7 @@ class SequentialQuadratic:
     improvement: float
     rounding: float = 1e-13
     feasible: float = np.inf
+    share: float = SHARE
 
     def init(
         self, aim: Float[np.ndarray, " objectives"], y: Float[np.ndarray, " free"], evaluation: Evaluation
@@ -234,7 +236,7 @@ class SequentialQuadratic:
 
     @property
     def _share(self) -> float:
-        return SHARE if self.scaling.objectives > 1 else 0.0
+        return self.share if self.scaling.objectives > 1 else 0.0
 
     def _move(self, state: SearchState, y: np.ndarray, evaluation: Evaluation, promised: float) -> None:
         """Go to a tried point if it is better, and adapt the trust region."""
@@ -273,7 +275,8 @@ class SequentialQuadratic:
             lower, upper = (np.where(state.fixed, 0.0, end) for end in (lower, upper))
         unit = self.scaling.unit
         slopes, curvature = state.evaluation.slopes / unit[:, None], state.curvature / unit[:, None, None]
-        reach = np.abs(slopes[:count]) @ np.maximum(-lower, upper)
+        box = np.maximum(-lower, upper)
+        reach = np.abs(slopes[:count]) @ box
         # The improvement that a step can bring; where limits are far dearer than objectives, each in their own size.
         size = float(np.clip(reach[:count].max(), 1e-12, max(1.0, state.penalty / PENALTY)))
         of_limits = min(size, 1.0)
@@ -293,6 +296,7 @@ class SequentialQuadratic:
             self._share,
             state.penalty * of_limits / size,
         )
+        models = models if self._share else models.of_largest(box)
         step, promised = models.best_step(lower, upper, region.matrix, region.least - region.matrix @ state.y)
         return step, size * promised
 

@@ -38,6 +38,20 @@ class StepModels(NamedTuple):
         bent = self.curvature @ step
         return self.slopes @ step + 0.5 * bent @ step, self.slopes + bent
 
+    def of_largest(self, box: Float[np.ndarray, " free"]) -> "StepModels":
+        """The models without objectives that are the largest nowhere in a box: steps up to these sizes."""
+        count, size = self.objectives, len(self.level)
+        reach = np.abs(self.slopes[:count]) @ box
+        highest = self.level[:count] + reach + 0.5 * np.abs(self.curvature[:count]) @ box @ box
+        of_planes = (self.planes + np.abs(self.plane_slopes) @ box).reshape(-1, size)[:, :count]
+        highest = np.maximum(highest, of_planes.max(axis=0, initial=-np.inf))
+        kept = np.append(~(highest < (self.level[:count] - reach).max()), np.full(size - count, True))
+        planes = np.tile(kept, len(self.planes) // size)
+        return StepModels(
+            self.level[kept], self.slopes[kept], self.curvature[kept],
+            self.planes[planes], self.plane_slopes[planes], int(kept[:count].sum()), self.share, self.penalty,
+        )  # fmt: skip
+
     def reached(self, step: Float[np.ndarray, " free"]) -> tuple[float, float, float]:
         """The improvement by a step, and the largest excess and violation after it."""
         count, change = self.objectives, self.change(step)[0]

@@ -17,7 +17,6 @@ from jaxdamp.tune.combinations import Combinations
 from jaxdamp.tune.limits import Limit, LimitEnd, limit_ends
 from jaxdamp.tune.measuring import LANES
 from jaxdamp.tune.ranges import MOST_COMBINATIONS
-from jaxdamp.tune.scenario_ride import smooth_in_scenarios
 from jaxdamp.tune.task import DesignTask, Evaluator, Tolerance
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -69,8 +68,8 @@ class Descent:
         If one ends before an optimum, its estimate of the curvature is wrong or a kink has stopped it: it is started
         again.
         """
-        solver = self._solver(float(self._evaluator.sizes(evaluations[0])[0]), limit_ends(limits))
-        aim, held = np.zeros(1), self.task.space.is_held
+        solver = self._solver(float(self._evaluator.sizes(evaluations[0]).max()), limit_ends(limits))
+        aim, held = np.zeros(len(self.task.followed)), self.task.space.is_held
         fixed = held if fixed is None else fixed | held
         states = [solver.init(aim, y, now) for y, now in zip(starts, evaluations, strict=True)]
         for state in states:
@@ -83,8 +82,8 @@ class Descent:
             rounds += 1
             for state, history in zip(states, histories, strict=True):
                 if len(history) < state.steps:
-                    history.append(float(state.evaluation.rows[0]))
-            self._progress(rounds, min(float(state.evaluation.rows[0]) for state in states))
+                    history.append(self.task.metric(state.evaluation))
+            self._progress(rounds, min(self.task.metric(state.evaluation) for state in states))
 
         solver.solve(self._evaluator.at, states, note)
         for _ in range(RESTARTS):
@@ -99,14 +98,17 @@ class Descent:
     def _solver(self, level: float, ends: Sequence[LimitEnd]) -> SequentialQuadratic:
         """The solver for an objective of this size, and limits with these ends."""
         tolerance = self.task.tolerance
-        zeros, units = [0.0, *(end.sign * end.value for end in ends)], [level, *(end.scale for end in ends)]
+        count = len(self.task.followed)
+        zeros = [*[0.0] * count, *(end.sign * end.value for end in ends)]
+        units = [*[level] * count, *(end.scale for end in ends)]
         return SequentialQuadratic(
             self._evaluator.region,
-            Scaling(np.array(zeros), np.array(units), 1),
+            Scaling(np.array(zeros), np.array(units), count),
             self._max_steps,
             improvement=0.1 * tolerance.rounding,
             rounding=tolerance.rounding,
             feasible=0.1 * tolerance.limit,
+            share=0.0,
         )
 
     def _ended_early(self, state: SearchState, scaling: Scaling) -> bool:
@@ -137,7 +139,7 @@ class Driven:
         self.task, self.ends, self._impossible, least = evaluator.task, list[Ended](), impossible, math.inf
         for part in np.array_split(points, math.ceil(len(points) / LANES)):
             evaluations = evaluator.at(part / self.task.space.unit)
-            least = min(least, *(float(one.rows[0]) for one in evaluations))
+            least = min(least, *map(self.task.metric, evaluations))
             pairs = zip(part, evaluations, strict=True)
             self.ends += [Ended(point, one, (), out_of_steps=False, slope_left=lambda: 0.0) for point, one in pairs]
             progress(len(self.ends), least)
@@ -155,7 +157,7 @@ class Driven:
         task, ranks = self.task, [rank(self.task, one, limits) for one in self.ends]
         order = sorted(range(len(ranks)), key=lambda i: ranks[i])
         ends = [self.ends[i] for i in order]
-        each = [printed_numbers(task, one) for one in ends]
+        each = [task.numbers(one.evaluation.values) for one in ends]
         names = dict.fromkeys([task.objective.name, *task.allowed])
         owners = zip(task.space.free.names, task.space.free.owners, strict=True)
         return Combinations(
@@ -190,18 +192,9 @@ def _is_allowed(task: DesignTask[AbstractVehicle], point: Sequence[float]) -> bo
     return True
 
 
-def printed_numbers(task: DesignTask[AbstractVehicle], ended: Ended) -> dict[str, float]:
-    """The numbers at the end of a search: of scenarios by the true risk, where the search has a smooth one."""
-    numbers = task.numbers(ended.evaluation.values)
-    if not smooth_in_scenarios(task.measured.ride):
-        return numbers
-    vehicle = task.space.free.build(jnp.asarray(ended.values, task.space.free.values.dtype))
-    return numbers | task.measured.by_true_risk(vehicle)
-
-
 def rank(task: DesignTask[AbstractVehicle], ended: Ended, limits: Sequence[Limit]) -> tuple[float, float]:
     """By how much limits are violated at the end of a search, and the metric there; infinite if it has none."""
-    numbers = printed_numbers(task, ended)
+    numbers = task.numbers(ended.evaluation.values)
     beyond = [max(-limit.margin(numbers[limit.name]), 0.0) for limit in missed(limits, numbers, task.tolerance)]
     pair = float(sum(beyond)), numbers[task.objective.name]
     return (math.inf, math.inf) if any(map(math.isnan, pair)) else pair
@@ -217,25 +210,37 @@ def missed(limits: Sequence[Limit], values: Mapping[str, float], tolerance: Tole
     return [limit for limit in limits if not limit.margin(values[limit.name]) >= -tolerance.limit]
 
 
+def walls_of(
+    task: DesignTask[AbstractVehicle], evaluation: Evaluation, tight: np.ndarray | Sequence[int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """The slopes of the metric, and of what holds it: limits that are reached, other scenarios that are as bad."""
+    count, metric = len(task.followed), task.metric(evaluation)
+    rows, slopes = evaluation.rows[:count], evaluation.slopes
+    alike = np.flatnonzero(rows >= metric - task.tolerance.limit * abs(metric))
+    first, *others = slopes[alike]
+    return first, np.concatenate([slopes[count:][tight], *((other - first)[None] for other in others)])
+
+
 def _slope_left(evaluator: Evaluator, state: SearchState, scaling: Scaling) -> float:
     """Length of the scaled gradient after projection on bounds and active limits, relative to the metric.
 
     Zero where a search ended by itself at a metric of zero, such as a distance from targets that are met.
     """
-    space, (_, rows, slopes) = evaluator.task.space, state.evaluation
-    if state.converged and abs(scaling.of(rows)[0]) < AT_ZERO:
+    task, rows = evaluator.task, state.evaluation.rows
+    if state.converged and np.abs(scaling.of(rows)[: scaling.objectives]).max() < AT_ZERO:
         return 0.0
-    unbound = np.array([not side for side in space.side(state.y * space.unit)])
+    unbound = np.array([not side for side in task.space.side(state.y * task.space.unit)])
     unbound &= True if state.fixed is None else ~state.fixed
-    gradient, walls = slopes[0, unbound], slopes[1:][_tight(evaluator, rows, scaling)][:, unbound].T
+    gradient, walls = walls_of(task, state.evaluation, _tight(evaluator, rows, scaling))
+    gradient, walls = gradient[unbound], walls[:, unbound].T
     if walls.size and gradient.size:
         gradient = gradient - walls @ np.linalg.lstsq(walls, gradient, rcond=None)[0]
-    return float(np.linalg.norm(gradient)) / max(abs(float(rows[0])), 1e-300)
+    return float(np.linalg.norm(gradient)) / max(abs(task.metric(state.evaluation)), 1e-300)
 
 
 def _tight(evaluator: Evaluator, rows: np.ndarray, scaling: Scaling) -> np.ndarray:
     """Which ends of limits are reached."""
-    return -scaling.of(rows)[1:] < evaluator.task.tolerance.limit
+    return -scaling.of(rows)[scaling.objectives :] < evaluator.task.tolerance.limit
 
 
 def _slope_left_at_kink(evaluator: Evaluator, state: SearchState, scaling: Scaling) -> float:
@@ -251,13 +256,13 @@ def _slope_left_at_kink(evaluator: Evaluator, state: SearchState, scaling: Scali
     import scipy.optimize
 
     space, free, region = evaluator.task.space, len(state.y), evaluator.region
-    size = max(abs(float(state.evaluation.rows[0])), 1e-300)
+    size, count = max(abs(evaluator.task.metric(state.evaluation)), 1e-300), scaling.objectives
     near = state.y + NEAR * np.random.default_rng(0).uniform(-1.0, 1.0, (4 * free + 4, free))
     sampled = [state.evaluation, *evaluator.at(np.clip(near, region.lower, region.upper))]
     tight = _tight(evaluator, state.evaluation.rows, scaling)
     moved = np.ones(free) if state.fixed is None else 1.0 - state.fixed
-    gradients = [moved * one.slopes[0] / size for one in sampled]
-    walls = [moved * wall for one in sampled for wall in one.slopes[1:][tight]]
+    gradients = [moved * one.slopes[np.argmax(one.rows[:count])] / size for one in sampled]
+    walls = [moved * wall for one in sampled for wall in one.slopes[count:][tight]]
     sides = {"lower": -1.0, "upper": 1.0}
     at_bounds = space.side(state.y * space.unit)
     walls += [sides[side] * row for side, row in zip(at_bounds, np.eye(free), strict=True) if side]

@@ -161,7 +161,7 @@ class ParetoFront(AbstractResult, Generic[V]):
         """Every metric of another vehicle of the same kind on the same road, such as a baseline."""
         must, remedy = f"be a {type(self.start).__name__}, as the start", "Compare vehicles of one kind."
         _checks.instance("vehicle", vehicle, type(self.start), must, remedy)
-        values = self.measured.by_true_risk(vehicle) or self.measured(vehicle)
+        values = self.measured(vehicle)
         return MetricValues.with_units({name: float(values[name]) for name in self.units}, self.units)
 
     plot = drawn_by("pareto", "The front with its knee, the start and other vehicles, and the laws along it.")

@@ -1,7 +1,7 @@
 """What a tuning computes of a vehicle: metrics on one road or over scenarios, in one compiled program."""
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple, final
 
@@ -21,7 +21,7 @@ from jaxdamp.roads import WhiteRoad
 from jaxdamp.simulation import Ride, moves_axles
 from jaxdamp.tune.limits import in_scenarios
 from jaxdamp.tune.objective import Objective
-from jaxdamp.tune.scenario_ride import ScenarioRide, exact, smooth_in_scenarios
+from jaxdamp.tune.scenario_ride import ScenarioRide
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import RUN, Run
 from jaxdamp.tune.shape import ShapeNumbers
@@ -96,16 +96,6 @@ class Measurement(eqx.Module):
         """The metrics and the objective of a vehicle in each scenario, shape (scenarios,)."""
         assert isinstance(self.ride, ScenarioRide)
         return self.objective.of_each(self.ride.of_vehicle(vehicle).each())
-
-    def reported(self, each: Mapping[str, Array | np.ndarray]) -> dict[str, float]:
-        """The metrics of `each` as they are printed: joined by the true risk, not by the smooth one of a search."""
-        assert isinstance(self.ride, ScenarioRide)
-        risk, weights = exact(self.ride.risk), self.ride.weights
-        return {name: float(risk(jnp.asarray(values), weights)) for name, values in each.items()}
-
-    def by_true_risk(self, vehicle: AbstractVehicle) -> dict[str, float]:
-        """The metrics of a vehicle as they are printed, where a search joins scenarios by a smooth risk; else none."""
-        return self.reported(self.each(vehicle)) if smooth_in_scenarios(self.ride) else {}
 
     def __call__(self, vehicle: AbstractVehicle) -> dict[str, Scalar]:
         """The metrics and the objective of a vehicle by name; those of scenarios by their risk, and some in each."""

@@ -16,14 +16,14 @@ from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, MetricValues
 from jaxdamp.solve import Evaluation
 from jaxdamp.tune.combinations import Combinations, beside_next
-from jaxdamp.tune.descending import Descent, Driven, Ended, every_combination, missed, printed_numbers, rank, reached
+from jaxdamp.tune.descending import Descent, Driven, Ended, every_combination, missed, rank, reached, walls_of
 from jaxdamp.tune.limits import Limit, LimitEnd, LimitRange, decided, end_moved, in_each, limit_ends, lost_limits
 from jaxdamp.tune.measuring import ride_on
 from jaxdamp.tune.objective import Function, check_objective
 from jaxdamp.tune.ranges import start_points
-from jaxdamp.tune.rescoring import Rescore, driver, other_roads, rescored
+from jaxdamp.tune.rescoring import Rescore, other_roads, rescored
 from jaxdamp.tune.result import Attempt, Drive, ScenarioValues, TuneResult, V
-from jaxdamp.tune.scenario_ride import ScenarioRide, risen_notes
+from jaxdamp.tune.scenario_ride import ScenarioRide
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import DEFAULTS, Settings
 from jaxdamp.tune.task import DesignTask, Evaluator, check_call, is_white
@@ -166,7 +166,7 @@ def _best(descent: Descent | Driven, several: Sequence[Ended], limits: Sequence[
     if not task.space.is_choice.any():
         return best
     chosen = min(descent.choose(best, limits), key=lambda one: rank(task, one, limits))
-    steps = chosen.history or (float(chosen.evaluation.rows[0]),)
+    steps = chosen.history or (task.metric(chosen.evaluation),)
     return chosen._replace(history=best.history + steps)
 
 
@@ -175,7 +175,7 @@ def _attempts(
 ) -> tuple[Attempt, ...]:
     """The searches from several starts, given by their coordinates."""
     pairs = zip(starts * task.space.unit, several, strict=True)
-    numbers = [printed_numbers(task, one) for one in several]
+    numbers = [task.numbers(one.evaluation.values) for one in several]
     return tuple(
         Attempt(
             start,
@@ -223,9 +223,7 @@ def _result(
         notes.append(early_end(ended, asked["max_steps"]))
     tuned = space.free.build(jnp.asarray(ended.values, space.free.values.dtype))
     runs, extrapolated = task.notes_on_runs(tuned)
-    each, reported = _in_scenarios(task, tuned, before, after)
-    sides = ((before, after), reported)  # by the risk of the search, and by the true one
-    notes += risen_notes(objective.name, *((side[0][objective.name], side[1][objective.name]) for side in sides))
+    reported = [{name: side[name] for name in units} for side in (before, after)]
     road = task.road.scenarios[0].road if isinstance(task.road, Scenarios) else task.road
     return TuneResult(
         vehicle=tuned,
@@ -244,7 +242,7 @@ def _result(
         active=active_words(held, after, changes, space, ended.values, tightened),
         fresh=fresh,
         starts=attempts,
-        scenarios=each,
+        scenarios=_in_scenarios(task, tuned),
         without_effect=idle,
         drive=Drive(road, task.run),
         violated=violations(short, after),
@@ -267,13 +265,10 @@ def _on_fresh_roads(
     one, other = (task.space.free.build(jnp.asarray(side, task.space.free.values.dtype)) for side in sides)
     cars = one, other
 
-    def by_search(road: Road | Scenarios) -> list[dict[str, float]]:
+    def drive(road: Road | Scenarios) -> list[dict[str, float]]:
         ride = ride_on(task.vehicle, road, task.objective, task.run)
         return [task.numbers(row) for row in evaluator.program.at(designs, ride).values]
 
-    of_scenarios = isinstance(task.road, Scenarios)  # whose true risk counts, not a smooth one
-    by_risk = driver(cars, task.objective.metrics, task.objective, task.run, list(task.allowed))
-    drive = by_risk if of_scenarios else by_search
     name, others, driven = task.objective.name, other_roads(task.road, numbers), None
     for first, last in itertools.pairwise([0, *(FEWEST * 2**i for i in range(len(numbers)))]):
         part = others[first:last]
@@ -287,16 +282,13 @@ def _on_fresh_roads(
     return driven
 
 
-def _in_scenarios(
-    task: DesignTask[AbstractVehicle], tuned: AbstractVehicle, before: dict[str, float], after: dict[str, float]
-) -> tuple[ScenarioValues | None, list[dict[str, float]]]:
-    """All metrics in every scenario, and those that are reported: joined by the true risk, not by a smooth one."""
-    measured, names = task.measured, task.units
-    each, reported = None, [before, after]
-    if isinstance(measured.ride, ScenarioRide):
-        sides = [{n: np.asarray(x, float) for n, x in measured.each(car).items()} for car in (task.vehicle, tuned)]
-        each, reported = ScenarioValues(measured.scenario_names, *sides), [measured.reported(side) for side in sides]
-    return each, [{name: values[name] for name in names} for values in reported]
+def _in_scenarios(task: DesignTask[AbstractVehicle], tuned: AbstractVehicle) -> ScenarioValues | None:
+    """All metrics in every scenario, before and after; None on one road."""
+    measured = task.measured
+    if not isinstance(measured.ride, ScenarioRide):
+        return None
+    sides = [{n: np.asarray(x, float) for n, x in measured.each(car).items()} for car in (task.vehicle, tuned)]
+    return ScenarioValues(measured.scenario_names, *sides)
 
 
 def _relaxation(task: DesignTask[V], ended: Ended, limits: tuple[Sequence[Limit], Sequence[Limit]]) -> str:
@@ -307,11 +299,11 @@ def _relaxation(task: DesignTask[V], ended: Ended, limits: tuple[Sequence[Limit]
     which this is the smallest share of its scale, if it is near. All places or scenarios are relaxed alike.
     """
     ends, of = limit_ends(limits[0]), {limit.name: limit for limit in limits[0]}
-    rows = ended.evaluation.rows
-    over = [(row - end.sign * end.value) / end.scale for end, row in zip(ends, rows[1:], strict=True)]
+    rows = ended.evaluation.rows[len(task.followed) :]
+    over = [(row - end.sign * end.value) / end.scale for end, row in zip(ends, rows, strict=True)]
     worst = {of[ends[i].name].of: i for i in np.argsort(over) if over[i] > task.tolerance.limit}
     if worst:
-        return _within_reach([(of[ends[i].name], ends[i], float(rows[1 + i])) for i in worst.values()])
+        return _within_reach([(of[ends[i].name], ends[i], float(rows[i])) for i in worst.values()])
     prices: dict[tuple[str, float], list[tuple[float, int]]] = {}
     for i, price in _prices(task, ended, limit_ends(limits[1])).items():
         limit, end = of[ends[i].name], ends[i]
@@ -322,7 +314,7 @@ def _relaxation(task: DesignTask[V], ended: Ended, limits: tuple[Sequence[Limit]
         return ""
     dearest = max(totals, key=totals.__getitem__)
     end = ends[max(prices[dearest])[1]]
-    by = end.scale * SHARE * abs(float(rows[0])) / totals[dearest]
+    by = end.scale * SHARE * abs(task.metric(ended.evaluation)) / totals[dearest]
     if by > FAR * abs(end.value):  # where there may be no such optimum
         return ""
     to = end.value + end.sign * by
@@ -339,11 +331,12 @@ def _within_reach(reached: Sequence[tuple[Limit, LimitEnd, float]]) -> str:
 
 def _prices(task: DesignTask[V], ended: Ended, ends: Sequence[LimitEnd]) -> dict[int, float]:
     """−df/d(limit) of each end of a limit that holds an optimum, by its number."""
-    _, rows, slopes = ended.evaluation
+    count, rows = len(task.followed), ended.evaluation.rows
     least, free = task.tolerance.limit, np.array([not side for side in task.space.side(ended.values)])
     free &= ~(task.space.is_choice | task.space.is_held)
-    tight = [i for i, end in enumerate(ends) if abs(rows[1 + i] - end.sign * end.value) < least * end.scale]
+    tight = [i for i, end in enumerate(ends) if abs(rows[count + i] - end.sign * end.value) < least * end.scale]
     if not (tight and free.any() and ended.slope_left() < task.tolerance.slope):
         return {}
-    multipliers = -np.linalg.lstsq(slopes[1:][tight][:, free].T, slopes[0, free], rcond=None)[0]
+    slope, walls = walls_of(task, ended.evaluation, tight)
+    multipliers = -np.linalg.lstsq(walls[:, free].T, slope[free], rcond=None)[0][: len(tight)]
     return {i: float(price) for i, price in zip(tight, multipliers, strict=True) if price > 0.0}

@@ -5,7 +5,6 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar, Unpack
 
-import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
@@ -14,7 +13,6 @@ from jaxdamp._settings import with_defaults
 from jaxdamp._status import Status
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, current_name
-from jaxdamp.simulation import Ride
 from jaxdamp.solve import SearchState
 from jaxdamp.tune.descending import missed
 from jaxdamp.tune.front import FrontParameter, ParetoFront, non_dominated, shares_of
@@ -24,7 +22,6 @@ from jaxdamp.tune.objective import Function, check_objective
 from jaxdamp.tune.ranges import start_points
 from jaxdamp.tune.rescoring import other_roads
 from jaxdamp.tune.result import V
-from jaxdamp.tune.scenario_ride import ScenarioRide
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import DEFAULTS, Settings
 from jaxdamp.tune.smooth import exact_counterpart
@@ -119,8 +116,7 @@ def pareto(
     filled = between if len(chosen) > len(names) else 0
     if filled:
         designs, numbers = _with_designs_between(evaluator, designs, numbers, limits, between)
-    designs, numbers = _best_of(names, designs, _by_true_risk(task, designs, numbers))
-    before |= task.measured.by_true_risk(vehicle)
+    designs, numbers = _best_of(names, designs, numbers)
     worst = {name: float(numbers[name].max() + BEYOND * np.ptp(numbers[name])) for name in names}
     fresh, start_on_fresh = _on_fresh_roads(evaluator, designs, settings["fresh_roads"])
     front = ParetoFront[V](
@@ -296,19 +292,6 @@ def _best_of(
     return designs[best], {name: values[best] for name, values in numbers.items()}
 
 
-def _by_true_risk(
-    task: DesignTask[AbstractVehicle],
-    designs: np.ndarray,
-    numbers: Mapping[str, np.ndarray],
-    ride: Ride | ScenarioRide | None = None,
-) -> dict[str, np.ndarray]:
-    """The numbers with metrics joined by the true risk where the search joins them by a smooth one."""
-    measured = task.measured if ride is None else task.measured.by(ride)
-    cars = [task.space.free.build(jnp.asarray(one, task.space.free.values.dtype)) for one in designs]
-    each = [measured.by_true_risk(car) for car in cars]
-    return {**numbers, **{name: np.array([one[name] for one in each]) for name in each[0]}}
-
-
 def _on_fresh_roads(
     evaluator: Evaluator, designs: np.ndarray, count: int
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
@@ -320,6 +303,5 @@ def _on_fresh_roads(
     rides = [ride_on(task.vehicle, road, task.objective, task.run) for road in other_roads(task.road, range(count))]
     both = np.vstack([designs, task.space.start])
     runs = [dict(zip(task.names, evaluator.program.values(both, ride).T, strict=True)) for ride in rides]
-    runs = [_by_true_risk(task, both, run, ride) for run, ride in zip(runs, rides, strict=True)]
     values = {name: np.stack([run[name] for run in runs]) for name in task.names if runs}
     return {name: rows[:, :-1] for name, rows in values.items()}, {name: rows[:, -1] for name, rows in values.items()}

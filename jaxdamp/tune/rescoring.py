@@ -18,7 +18,6 @@ from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride, simulate
 from jaxdamp.tune.limits import amount, half_interval, in_scenarios, percentage
 from jaxdamp.tune.objective import Objective
-from jaxdamp.tune.scenario_ride import exact
 from jaxdamp.tune.scenarios import Road, Scenarios, check_roads
 from jaxdamp.tune.settings import RUN, Run
 from jaxdamp.vehicles import AbstractVehicle, frequency_response, linearise
@@ -232,9 +231,8 @@ def driver(
         if isinstance(road, Scenarios):
             ride = road.ride(car, metrics=metrics, **run)
             each = objective.of_each(ride.each()) if objective else ride.each()
-            risk = exact(ride.risk)
             own = {one: each[name][i] for name in limited for i, one in enumerate(in_scenarios(name, ride.names))}
-            return {name: risk(values, ride.weights) for name, values in each.items()} | own
+            return {name: ride.risk(values, ride.weights) for name, values in each.items()} | own
         values = Ride(car, road, metrics=metrics, **run)()
         return objective.of(values) if objective else values
 

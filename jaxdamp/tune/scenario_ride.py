@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 Values: TypeAlias = Float[Array, " scenarios"]
 Risk: TypeAlias = Callable[[Values, Values], Scalar]  # of the values and their weights, which add up to one
 T = TypeVar("T")
-SHARPNESS = 100.0  # of the smooth maximum
 
 
 def mean(values: Values, weights: Values) -> Scalar:
@@ -41,32 +40,9 @@ def mean(values: Values, weights: Values) -> Scalar:
 
 
 def worst(values: Values, weights: Values) -> Scalar:
-    """A smooth maximum, whatever the weights: never below the largest value, and above it by ln(n)/100 at most.
-
-    ln Σ exp(b x)/b with b = 100/|x|_max, so that all scenarios near the worst one take part in the derivative.
-    """
+    """The largest value, whatever the weights, with the derivatives of its scenario."""
     del weights
-    size = jax.lax.stop_gradient(largest(jnp.abs(values)))
-    scale = jnp.where(size > 0, size, 1.0) / SHARPNESS
-    return scale * jax.scipy.special.logsumexp(values / scale)
-
-
-def exact(risk: Risk) -> Risk:
-    """The risk as it is printed: the true largest value in place of the smooth one of a search."""
-    return (lambda values, weights: largest(values)) if risk is worst else risk
-
-
-def smooth_in_scenarios(ride: "Ride | ScenarioRide") -> bool:
-    """Whether a ride joins the metrics of scenarios by a smooth risk, which is not the printed one."""
-    return isinstance(ride, ScenarioRide) and exact(ride.risk) is not ride.risk
-
-
-def risen_notes(name: str, smooth: tuple[float, float], true: tuple[float, float]) -> list[str]:
-    """A sentence where a metric fell by the smooth risk of a search, but rose by the true one; before and after."""
-    if not (smooth[1] < smooth[0] and true[1] > true[0]):
-        return []
-    words = "The search followed a smooth maximum over the scenarios, which fell"
-    return [f"{words}: the true largest {name} rose from {true[0]:.4g} to {true[1]:.4g}."]
+    return largest(values)
 
 
 @final

@@ -64,7 +64,7 @@ class Scenarios:
         conditions: of the vehicle, by name or as a sequence; only as it is, if left out. `tolerances` and `samples`
             make them.
         weights: of the roads, relative to each other, in their order or by name; all equal if left out.
-        risk: `"mean"`; `"worst"`, a smooth maximum; or `CVaR(share)`, the mean of the worst share.
+        risk: `"mean"`; `"worst"`, the largest value; or `CVaR(share)`, the mean of the worst share.
 
     Raises:
         ValueError: no road; driven and white roads together; weights that are negative, or not one for each road.

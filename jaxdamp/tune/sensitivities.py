@@ -36,7 +36,6 @@ from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride
 from jaxdamp.tune.measuring import Measurement
 from jaxdamp.tune.objective import Function, Objective, goal_objective, objective_of
-from jaxdamp.tune.scenario_ride import exact
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.sensitivity_result import CurveSensitivity, Sensitivity
 from jaxdamp.tune.settings import RUN, Free, Run
@@ -127,7 +126,6 @@ def sensitivity(
     units = [*(p.unit for p in of_vehicle.owners), *("m/s" if name == "speed" else "" for name in given)]
     compiled = compiled_quickly if is_white(first) else compiled_for_loops
     values, slopes, second = _derivatives(measured, names, point, chosen if second_order else None, compiled)
-    values = _of_true_risk(values, names, vehicle, first, objective, run)
     return Sensitivity(
         values=dict(zip(names, values.tolist(), strict=True)),
         units={name: objective.units(vehicle)[name] for name in names},
@@ -138,17 +136,6 @@ def sensitivity(
         curves=_curve_parts(vehicle, hatted, paths, names, slopes[:, is_curve]),
         hessian=None if second is None else dict(zip(names, second, strict=True)),
     )
-
-
-def _of_true_risk(
-    values: np.ndarray, names: Sequence[str], vehicle: AbstractVehicle, road: object, objective: Objective, run: Run
-) -> np.ndarray:
-    """The values of metrics, in scenarios by the largest value where derivatives are those of a smooth one."""
-    if not isinstance(road, Scenarios) or (risk := exact(road.risk)) is road.risk:
-        return values
-    ride = road.ride(vehicle, metrics=objective.metrics, **run)
-    each = objective.of_each(ride.each())
-    return np.array([float(risk(each[name], ride.weights)) for name in names])
 
 
 def _objective(

@@ -34,7 +34,7 @@ from jaxdamp.tune.measuring import BatchProgram, Computed, Measurement
 from jaxdamp.tune.objective import Function, Targets, goal_limits, goal_objective, objective_of
 from jaxdamp.tune.ranges import SearchRange, search_range, start_points
 from jaxdamp.tune.result import V
-from jaxdamp.tune.scenario_ride import in_condition
+from jaxdamp.tune.scenario_ride import in_condition, worst
 from jaxdamp.tune.scenarios import Condition, Road, Scenario, Scenarios
 from jaxdamp.tune.settings import LEAST, RUN, Run, Settings
 from jaxdamp.tune.shape import ShapeNumbers
@@ -135,6 +135,8 @@ class DesignTask(Generic[V]):
         objective: all objectives, with their metrics.
         space: the free parameters and their ranges.
         measured: the metrics of a vehicle.
+        followed: names of the numbers whose largest one is minimised, or of those of a front: the objective in every
+            scenario for the worst case, else the objectives.
         names: of all numbers that the search computes.
         allowed: the range of each limited metric, as it is written.
         units: of the metrics.
@@ -170,15 +172,22 @@ class DesignTask(Generic[V]):
         self.tolerance = DOUBLE if self.space.free.values.dtype == np.float64 else SINGLE
         if not white:
             self.run = stepped_for_choices(self.run, self.space)
+        worst_case = len(objectives) == 1 and isinstance(road, Scenarios) and road.risk is worst
+        of_each = dict.fromkeys([*self.allowed, *self.objective.names * worst_case])
         self.measured = Measurement(
             vehicle, road, self.objective, self.space.free,
-            each=list(self.allowed), curves=ShapeNumbers.of(vehicle, settings["shape"], self.space.free), run=self.run,
+            each=list(of_each), curves=ShapeNumbers.of(vehicle, settings["shape"], self.space.free), run=self.run,
         )  # fmt: skip
+        self.followed = self.measured.entries(self.objective.name) if worst_case else self.objective.names
         self.names, self.units = self.measured.names, self.objective.units(vehicle)
 
     def numbers(self, values: np.ndarray) -> dict[str, float]:
         """Numbers of one design by name."""
         return dict(zip(self.names, map(float, values), strict=True))
+
+    def metric(self, evaluation: Evaluation) -> float:
+        """The first objective, where it was computed."""
+        return float(evaluation.values[self.names.index(self.objective.name)])
 
     def limits(self, before: Mapping[str, float]) -> list[Limit]:
         """All limits, in every scenario, their distances scaled by the numbers of the start."""
@@ -228,7 +237,7 @@ class Evaluator(Generic[V]):
     def __init__(self, task: DesignTask[V], lanes: int) -> None:
         self.task, self.program = task, BatchProgram(task.measured, task.space.free, lanes)
         self._inputs = ("metrics and slopes", task.vehicle, task.road, task.run, task.objective.name, task.names, lanes)
-        self._signed = [(name, 1.0) for name in task.objective.names]
+        self._signed = [(name, 1.0) for name in task.followed]
 
     def at(self, points: Float[np.ndarray, "points free"]) -> list[Evaluation]:
         """Numbers, rows and derivatives of the rows by the coordinates."""
@@ -267,7 +276,7 @@ class Evaluator(Generic[V]):
     def refuse_constant(self, start: Evaluation, others: Sequence[Evaluation] = ()) -> None:
         """Refuse objectives that do not depend on what is free: by their slopes, and by their values elsewhere."""
         task = self.task
-        count, rounding = len(task.objective.names), 100.0 * task.tolerance.rounding
+        count, rounding = len(task.followed), 100.0 * task.tolerance.rounding
         if start.slopes[:count].any():
             return
         others = others or self.at(start_points(task.space, 1 + ELSEWHERE, 0)[1:] / task.space.unit)
@@ -278,15 +287,15 @@ class Evaluator(Generic[V]):
             _checks.refuse(task.argument, "depend on what is free", f"{values} whatever they are", remedy)
 
     def sizes(self, start: Evaluation) -> Float[np.ndarray, " objectives"]:
-        """By what each objective is divided: its value at the start, or a part of what a step changes, if that is more.
+        """By what each row of objectives is divided: its value at the start, or a part of what a step changes, if more.
 
         Targets count as met at one, which is the least that they are divided by.
         """
-        objective, count = self.task.objective, len(self.task.objective.names)
+        objective, count = self.task.objective, len(self.task.followed)
         functions = dict(objective.functions)
         least = [1.0 if isinstance(functions.get(name), Targets) else 0.0 for name in objective.names]
         reach = NEAR_ZERO * np.abs(start.slopes[:count]).sum(axis=1)
-        sizes = np.maximum(np.maximum(np.abs(start.rows[:count]), reach), least)
+        sizes = np.maximum(np.maximum(np.abs(start.rows[:count]), reach), np.resize(least, count))
         return np.where(sizes > 0.0, sizes, 1.0)
 
     @property

@@ -20,9 +20,11 @@ def evaluated(function):
     return at
 
 
-def solved(function, starts, scaling, *, region=WIDE, aims=None, max_steps=200, feasible=1e-9, improvement=1e-14):
+def solved(
+    function, starts, scaling, *, region=WIDE, aims=None, max_steps=200, feasible=1e-9, improvement=1e-14, **more
+):
     """The searches from these starts."""
-    solver = SequentialQuadratic(region, scaling, max_steps, improvement=improvement, feasible=feasible)
+    solver = SequentialQuadratic(region, scaling, max_steps, improvement=improvement, feasible=feasible, **more)
     aims = [np.zeros(scaling.objectives)] * len(starts) if aims is None else aims
     at = evaluated(function)
     states = [solver.init(a, y, e) for a, y, e in zip(aims, starts, at(starts), strict=True)]
@@ -117,6 +119,21 @@ def test_aims_spread_along_a_front() -> None:
     states = solved(both, np.array([[0.3, 2.0]] * 2), Scaling(np.zeros(2), np.ones(2), 2), aims=aims)
     # x² − a₁ = (1 − x)² − a₂, up to the small share of the sum
     np.testing.assert_allclose([state.y for state in states], [[0.5, 0.0], [0.4, 0.0]], atol=1e-3)
+
+
+def test_the_largest_of_many_is_smallest_where_several_are_equal() -> None:
+    """Squared distances from points in a circle, three of them on it: the largest is smallest at its centre, 3²."""
+    centre, on_circle = np.array([1.0, 2.0]), np.deg2rad([0.0, 130.0, 240.0])
+    places = 3.0 * np.stack([np.cos(on_circle), np.sin(on_circle)], axis=1)
+    points = centre + np.concatenate([places, np.random.default_rng(0).uniform(-2.0, 2.0, (60, 2))])
+
+    def distances(*at):
+        return [(float(np.sum((at - point) ** 2)), 2.0 * (at - point)) for point in points]
+
+    (state,) = solved(distances, np.array([[-4.0, 4.0]]), Scaling(np.zeros(63), np.ones(63), 63), share=0.0)
+    np.testing.assert_allclose(state.y, centre, atol=1e-6)
+    assert state.converged and state.steps < 20
+    np.testing.assert_allclose(state.evaluation.rows[:3], 9.0, rtol=1e-6)
 
 
 def test_points_without_numbers_are_no_steps() -> None:

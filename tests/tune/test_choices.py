@@ -5,6 +5,7 @@ import itertools
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 
 from jaxdamp import Ride, dampers, roads, sweep, tune, vehicles
 from jaxdamp.parameters import free_parameters, get, replace
@@ -153,7 +154,7 @@ def test_wrong_choices_are_refused() -> None:
 
 
 def test_the_worst_case_of_combinations_is_the_true_one():
-    """A smooth maximum is larger where scenarios are alike: by it the other combination, 1.2 % worse, was the best."""
+    """Of a combination and of a search, also where eight of nine scenarios are alike: its optimum is a kink."""
     car, road = vehicles.presets.quarter_car_000(), roads.white("C", 20.0)
     conditions = {"worn": tune.Condition(factors={"damper.rate": 0.7})}
     conditions |= {f"cold {i}": tune.Condition(factors={"damper.rate": 1.4}) for i in range(8)}
@@ -170,7 +171,8 @@ def test_the_worst_case_of_combinations_is_the_true_one():
     np.testing.assert_array_equal(tuned.combinations.choices["damper.rate"], rates[::-1])
     np.testing.assert_allclose(tuned.combinations.metrics[name], [worst(4700.0), worst(4400.0)], rtol=1e-6)
     descended = tune.minimise(name, tuned.vehicle, scenarios, over=["damper.rate"], starts=2)
-    assert descended.after[name] > worst(4700.0)  # the optimum of the smooth maximum is elsewhere, which is said
-    assert f"the true largest {name} rose from 0.8734 to {descended.after[name]:.4g}." in descended.warnings[-1]
-    (end, *_), metrics = descended.starts[0].end, [attempt.metric for attempt in descended.starts]
-    assert metrics[0] == pytest.approx(worst(end), rel=1e-6) and float(descended.after[name]) == min(metrics)
+    best = minimize_scalar(worst, bounds=(2000.0, 6000.0), method="bounded", options={"xatol": 1e-3})
+    assert descended.converged and descended.after[name] == pytest.approx(best.fun, rel=1e-6)
+    assert get(descended.vehicle, "damper.rate") == pytest.approx(best.x, rel=1e-5)
+    (end, *_), of_starts = descended.starts[0].end, [attempt.metric for attempt in descended.starts]
+    assert of_starts[0] == pytest.approx(worst(end), rel=1e-6) and float(descended.after[name]) == min(of_starts)

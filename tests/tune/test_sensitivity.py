@@ -124,11 +124,11 @@ def test_a_negative_value_rises_and_falls_as_a_positive_one(plain) -> None:
 
 @pytest.mark.slow
 def test_the_value_in_the_worst_scenario_is_the_true_one() -> None:
-    """A smooth maximum of two equal numbers, of which derivatives are, would be 0.7 % larger."""
+    """Of two equal scenarios, value and derivatives are those of one."""
     both = tune.Scenarios([WHITE, WHITE], risk="worst")
     found, alone = (tune.sensitivity(METRICS[0], LINEAR, road, over=["rate"], dampers=None) for road in (both, WHITE))
     assert found.values[METRICS[0]] == pytest.approx(alone.values[METRICS[0]], rel=1e-9)
-    assert found.gradient[METRICS[0]][0] == pytest.approx(alone.gradient[METRICS[0]][0], rel=0.01)
+    assert found.gradient[METRICS[0]][0] == pytest.approx(alone.gradient[METRICS[0]][0], rel=1e-9)
 
 
 def test_results_show_themselves(found) -> None:
