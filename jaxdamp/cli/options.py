@@ -7,10 +7,11 @@ that the function gets is on the command line by itself. `offers` lists what is 
 """
 
 import ast
+import contextlib
 import functools
 import inspect
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -18,9 +19,11 @@ from typing import Annotated, NamedTuple
 
 import typer
 
+from jaxdamp import _unit_registry
 from jaxdamp.cli import offers
 from jaxdamp.cli.offers import Written
 from jaxdamp.cli.signatures import REQUIRED, Argument, Arguments, arguments, options_class
+from jaxdamp.cli.words import quantity
 
 
 PLAIN = {"str": str, "int": int, "float": float, "bool": bool}
@@ -29,6 +32,8 @@ LONGEST = 200  # characters of a first sentence; a longer one ends at its first 
 _DICTIONARY = re.compile(r"\{[^{}]*\}")
 _PYTHON = re.compile(r"\b(None|True|False|lambda)\b|\bas in `")
 _LIMITS = re.compile(r"\{(\w+): \((\w+), ([\w ]+)\)\}")
+_UNIT = re.compile(r"\[([^\]\s]+)\]")  # in the text on an argument that is one number
+OTHER_UNITS = {"m/s": "72km/h", "s": "5ms", "Hz": "1kHz", "N": "5lbf"}  # examples, by the unit of an option
 
 
 @dataclass(frozen=True)
@@ -127,6 +132,8 @@ def parameters(command: str, target: str) -> list[inspect.Parameter]:
         words: Arguments = {"help": _help(command, name, argument, how)}
         if isinstance(how, Written):
             kind, words["metavar"] = list[str] if how.repeated else str, how.metavar
+        elif how is float and (unit := _UNIT.search(argument.text)):
+            kind, words["metavar"], words["parser"] = how, "NUMBER[UNIT]", number_in(unit[1])
         else:
             kind = list[Path] if how is Path and "Sequence[Path]" in argument.kinds else how
         if positional:
@@ -165,6 +172,25 @@ def build(target: str, read: Mapping[tuple[str, ...], object]) -> Arguments:
             module, _, name = nested.rpartition(".")
             made[argument.name] = getattr(import_module(f"jaxdamp.{module}"), name)(**build(nested, inside))
     return made
+
+
+def number_in(unit: str) -> Callable[[str], float]:
+    """The reader of one number in a unit, or in another one that is named.
+
+    >>> number_in("m/s")("20"), number_in("m/s")("72 km/h"), number_in("s")("5ms")
+    (20.0, 20.0, 0.005)
+    """
+
+    def read(text: str) -> float:
+        number, written = quantity(text) or (text, "")
+        factor = _unit_registry.ratio(written, unit) if written else 1.0
+        with contextlib.suppress(ValueError):
+            if factor is not None:
+                return float(number) * factor
+        raise typer.BadParameter(f"{text!r} is neither a number in {unit} nor one with a unit, such as {example}.")
+
+    example = OTHER_UNITS[unit]
+    return read
 
 
 def aliases(command: str, target: str) -> dict[str, str]:

@@ -97,12 +97,12 @@ def unusual(road: str, speed: float) -> list[str]:
     """Sentences on a speed [m/s] or a bump that no road vehicle meets every day, as where another unit was meant.
 
     >>> unusual("iso:C", 72.0)
-    ['unusual: --speed 72 is 259 km/h. It is in m/s: if km/h was meant, write --speed 20.']
+    ['unusual: a speed of 72 m/s is 259 km/h. Without a unit it is in m/s: if km/h was meant, write --speed 72km/h.']
     """
     notes = []
     if speed > FASTEST:
-        remedy = f"It is in m/s: if km/h was meant, write --speed {speed / 3.6:.3g}."
-        notes.append(f"unusual: --speed {speed:g} is {3.6 * speed:.0f} km/h. {remedy}")
+        remedy = f"Without a unit it is in m/s: if km/h was meant, write --speed {speed:g}km/h."
+        notes.append(f"unusual: a speed of {speed:g} m/s is {3.6 * speed:.0f} km/h. {remedy}")
     kind, *size = road.split(":")
     if kind == "bump" and len(size) == 2:
         height, length = map(float, size)

@@ -35,7 +35,7 @@ def _written(law: AbstractDamper, path: Path) -> Path:
 
 def test_ride_compares_a_law_with_a_baseline(law: Path, tmp_path: Path) -> None:
     base, out = _written(Linear(1500.0), tmp_path / "base.json"), tmp_path / "ride"
-    words = ["--speed", "16", "--duration", "2", "--dt", "0.002", "--verbose", "--out", out]
+    words = ["--speed", "57.6km/h", "--duration", "2 s", "--dt", "2ms", "--verbose", "--out", out]
     text = jaxdamp("ride", "half_car_002", "bump:0.05:4", "--start", law, "--baseline", base, *words).output
     assert "Axles: rear axle 0.156 s behind the front (2.5 m at 16 m/s)." in text
     assert "rear axle 0.156 s" in (out / "report.html").read_text()
@@ -77,6 +77,8 @@ def test_a_ride_says_at_which_command_its_dampers_are(law: Path, tmp_path: Path)
         (["quarter_car_000", "bump:3"], "ROAD must read like bump:HEIGHT:LENGTH"),
         (["quarter_car_000", "nothing.csv"], "a file that is there, but is 'nothing.csv'"),
         (["quarter_car_000", "--speed", "-3"], "Option --speed must be positive"),
+        (["quarter_car_000", "--speed", "72kg"], "'72kg' is neither a number in m/s nor one with a unit"),
+        (["quarter_car_000", "--duration", "long"], "'long' is neither a number in s"),
         (["quarter_car_000", "--duration", "0"], "Option --duration must be positive"),
         (["quarter_car_000", "--delay", "0.05"], "Option --delay must be given with --controller"),
         (["quarter_car_000", "--actuator-lag", "0"], "Option --actuator-lag must be given with --controller"),
