@@ -80,12 +80,13 @@ def amount(value: float, unit: str) -> str:
 def percentage(change: float, half_width: float = math.nan) -> str:
     """A change [%] in words, with half the width of its interval [%] if it has one.
 
-    >>> percentage(-15.61, 0.62), percentage(3.4e9)
-    ('-15.6 ± 0.6 %', '+3.4e+09 %')
+    >>> percentage(-15.61, 0.62), percentage(3.4e9), percentage(-0.01)
+    ('-15.6 ± 0.6 %', '+3.4e+09 %', '0.0 %')
     """
     spec = ".1f" if abs(change) < MANY_DIGITS else ".2g"
     error = f" ± {half_width:{spec}}" if math.isfinite(half_width) else ""
-    return f"{change:+{spec}}{error} %"
+    text = f"{change:+{spec}}"
+    return f"{text if float(text) else text[1:]}{error} %"  # nothing has no sign
 
 
 def in_scenarios(name: str, scenarios: Sequence[str]) -> list[str]:

@@ -248,7 +248,11 @@ def _result(
         violated=violations(short, after),
         extrapolated=tuple(extrapolated),
         allowed=task.allowed,
-        elsewhere=where_it_holds(white=is_white(task.road), fresh_roads=asked["fresh_roads"]),
+        elsewhere=where_it_holds(
+            white=is_white(task.road),
+            fresh_roads=asked["fresh_roads"],
+            scenarios=task.road.in_words if isinstance(task.road, Scenarios) else "",
+        ),
         relaxation=_relaxation(task, ended, limits),
         tightened=tightened,
     )

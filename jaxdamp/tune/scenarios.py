@@ -16,7 +16,7 @@ from jaxdamp._types import Point, Value
 from jaxdamp.metrics import Metric
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import AbstractEngine
-from jaxdamp.tune.scenario_ride import Risk, ScenarioRide, risk_of, scenario_ride
+from jaxdamp.tune.scenario_ride import Risk, ScenarioRide, mean, risk_of, scenario_ride, worst
 from jaxdamp.tune.settings import Run
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -133,6 +133,12 @@ class Scenarios:
     def white(self) -> bool:
         """Whether the roads are white."""
         return isinstance(self.scenarios[0].road, WhiteRoad)
+
+    @property
+    def in_words(self) -> str:
+        """Where a metric holds that is one number for all, as "in the worst of 4 scenarios"; empty of one scenario."""
+        kind = {mean: "in the mean of", worst: "in the worst of"}.get(self.risk, "over")
+        return f"{kind} {len(self)} scenarios" if len(self) > 1 else ""
 
     def on_other_roads(self, seed: int) -> "Scenarios | None":
         """The same scenarios on other realisations of their random roads; `None` if no road is random."""

@@ -98,7 +98,7 @@ def verdict_of(result: "TuneResult[AbstractVehicle]") -> Verdict:
     held = _limits_in_words(result)
     error = 0.0 if result.fresh is None else 100.0 * result.fresh.half_width(result.metric)
     over = lost_limits(result.fresh, _allowed(result))
-    lost = [f"{name} is {percentage(100 * x)[1:]} beyond its limit" for name, x in over.items()]
+    lost = [f"{name} is {percentage(100 * x).removeprefix('+')} beyond its limit" for name, x in over.items()]
     if lost:
         outcome, first, held = Outcome.LIMIT_LOST, f"Not better: {'; '.join(lost)}; {words}", ""
     elif _is_none(gain, error):
@@ -222,10 +222,10 @@ def bound_notes(space: SearchRange, changes: tuple[Change, ...]) -> list[str]:
     return notes
 
 
-def where_it_holds(*, white: bool, fresh_roads: int) -> str:
+def where_it_holds(*, white: bool, fresh_roads: int, scenarios: str) -> str:
     """Where the numbers of a tuning hold that was not tried on fresh roads, in words."""
     if white:
-        return "in the mean of all such roads"
+        return scenarios or "in the mean of all such roads"
     return "on the road of the tuning" + (", which cannot be drawn again" if fresh_roads else ", tried on no other")
 
 

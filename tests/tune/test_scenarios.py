@@ -73,6 +73,7 @@ def test_the_mean_over_white_roads_has_the_closed_form_optimum_and_the_worst_cas
     for risk in ("mean", "worst"):
         result = tune.minimise(ACCELERATION, LINEAR, tune.Scenarios(WHITE, risk=risk))
         assert result.parameters[0].after == pytest.approx(best, rel=1e-5), risk
+        assert f"% in the {risk} of 2 scenarios;" in result.summary
     assert result.scenarios is not None and result.scenarios.names == ("C", "D")
     assert result.scenario_table().records()[1]["scenario"] == "D"
     shown = [row["metric"] for row in result.table().records()]
