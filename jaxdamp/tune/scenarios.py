@@ -16,7 +16,7 @@ from jaxdamp._types import Point, Value
 from jaxdamp.metrics import Metric
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import AbstractEngine
-from jaxdamp.tune.scenario_ride import Risk, ScenarioRide, mean, risk_of, scenario_ride, worst
+from jaxdamp.tune.scenario_ride import RISKS, Risk, ScenarioRide, risk_of, scenario_ride
 from jaxdamp.tune.settings import Run
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -137,7 +137,7 @@ class Scenarios:
     @property
     def in_words(self) -> str:
         """Where a metric holds that is one number for all, as "in the worst of 4 scenarios"; empty of one scenario."""
-        kind = {mean: "in the mean of", worst: "in the worst of"}.get(self.risk, "over")
+        kind = next((f"in the {name} of" for name, risk in RISKS.items() if risk is self.risk), "over")
         return f"{kind} {len(self)} scenarios" if len(self) > 1 else ""
 
     def on_other_roads(self, seed: int) -> "Scenarios | None":
