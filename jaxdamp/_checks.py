@@ -24,12 +24,14 @@ class ArgumentError(ValueError):
     Attributes:
         argument: name of the argument at fault; empty if a file is at fault.
         settings: the arguments with values that the message mentions, each as `str(setting)`.
+        where: the file or table with which the message begins; empty if it is about no file.
     """
 
     def __init__(self, message: str, *settings: "Setting", argument: str = "") -> None:
         super().__init__(message)
         self.argument = argument
         self.settings = settings
+        self.where = ""
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Which column of a table is which quantity, and in which unit."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NoReturn
@@ -17,6 +18,7 @@ from jaxdamp.bench.units import USUAL, Conversion, conversion, gain_conversion, 
 
 
 REQUIRED = ("stroke", "force")
+_OF_MATRIX = re.compile(r"(.*)\[\d+\]")  # the place of a column in a matrix
 
 
 @dataclass(frozen=True)
@@ -64,18 +66,11 @@ def find_columns(table: RawTable, choice: Choice) -> tuple[dict[str, Column], tu
     A quantity that a record can do without, velocity, temperature or command, is left out where its column is
     doubtful, and a note says so, unless the caller asked for it. All that is wrong is refused together.
     """
-    if not table.is_named and not choice.columns:
-        numbers = Setting("columns", {"time": 0, "stroke": 1, "force": 2})
-        names = Setting("units", {"time": "s", "stroke": "mm", "force": "N"})
-        raise ArgumentError(
-            f"{table.where} has no header row, so its columns have no names: pass their numbers and units, for example "
-            f"{numbers}, {names}.",
-            numbers,
-            names,
-        )
+    if not choice.columns and not (table.is_named and _tells_apart(table)):
+        _refuse_unnamed(table)
     columns, notes, problems = {}, [], Problems()
     for role in ROLES:
-        with problems.collected():
+        with problems.collected(table.where):
             try:
                 index, more = _index(table, role, choice)
                 column = None if index is None else column_of(table, role, index, choice)
@@ -90,11 +85,26 @@ def find_columns(table: RawTable, choice: Choice) -> tuple[dict[str, Column], tu
                 columns[role] = column
     integrated = choice.stroke_from_velocity and "stroke" not in columns
     for role in ("velocity", "force") if integrated else REQUIRED:
-        with problems.collected():
+        with problems.collected(table.where):
             if role not in columns:
                 _refuse_missing(table, role, columns)
     problems.raise_any()
     return columns, tuple(notes)
+
+
+def _refuse_unnamed(table: RawTable) -> NoReturn:
+    """Refuse a table whose columns have no names."""
+    why = "holds a matrix" if table.is_named else "has no header row"
+    numbers = Setting("columns", {"time": 0, "stroke": 1, "force": 2})
+    units = Setting("units", {"time": "s", "stroke": "mm", "force": "N"})
+    said = f"{table.where} {why}, so its columns have no names: pass their numbers and units, for example"
+    raise ArgumentError(f"{said} {numbers}, {units}.", numbers, units)
+
+
+def _tells_apart(table: RawTable) -> bool:
+    """Whether the names of the columns are more than places in a matrix."""
+    places = [_OF_MATRIX.fullmatch(column.name) for column in table.columns]
+    return not all(places) or len({place[1] for place in places if place}) == len(places)
 
 
 def is_record(table: RawTable, choice: Choice, roles: Sequence[str] = REQUIRED) -> bool:

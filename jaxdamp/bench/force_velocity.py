@@ -195,7 +195,7 @@ def read_table(
     sheets, readers = find_files(asked, {*FOLDER_SUFFIXES, *(files["readers"] or {})}), with_own(files["readers"])
     notes, sides, problems, sign, stated = [*notes], [], Problems(), given["sign"], set()
     for file in sheets:
-        with problems.collected():
+        with problems.collected(str(file)):
             tables = [with_headers(table) for table in read_tables(file, readers, given["delimiter"])]
             fitting = [table for table in tables if is_force_velocity(table, choice)]
             if not fitting:

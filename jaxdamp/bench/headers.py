@@ -25,11 +25,15 @@ NOT_MEASURED = {"setpoint", "command", "cmd", "demand", "target", "soll", "refer
 def split_header(header: str) -> tuple[str, str | None]:
     """Name and unit in a header that sets the unit apart: in brackets, behind a comma or behind a slash.
 
+    A number in brackets, as of a column of a matrix, is no unit.
+
     >>> split_header("Displacement, in"), split_header("force [N]"), split_header("v/(m/s)"), split_header("x_mm")
     (('Displacement', 'in'), ('force', 'N'), ('v', 'm/s'), ('x_mm', None))
+    >>> split_header("data[0]")
+    ('data[0]', None)
     """
     bracket = re.fullmatch(r"(.*?)\s*/?\s*[\[({<]\s*([^\[\](){}<>]*?)\s*[\])}>]", header)
-    if bracket:
+    if bracket and not bracket[2].isdigit():
         return bracket[1].strip(), bracket[2] or None
     for mark in (r"\s*,\s*", r"\s+/\s+", r"/"):
         parts = re.split(mark, header, maxsplit=1)

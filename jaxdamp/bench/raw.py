@@ -119,7 +119,7 @@ class RawTable:
 
 
 class Problems:
-    """Collects errors of single things, to raise them together.
+    """Collects errors of single things, to raise them together; what is wrong alike in several files is said once.
 
     >>> problems = Problems()
     >>> for text in ("one", "two"):
@@ -137,11 +137,13 @@ class Problems:
         self.errors: list[Exception] = []
 
     @contextmanager
-    def collected(self) -> Iterator[None]:
-        """Keep the error of this block, if it has one, and go on behind it."""
+    def collected(self, where: str = "") -> Iterator[None]:
+        """Keep the error of this block on a file or a table, if it has one, and go on behind it."""
         try:
             yield
         except (ValueError, OSError, ImportError) as error:
+            if isinstance(error, ArgumentError):
+                error.where = error.where or where
             self.errors.append(error)
 
     def raise_any(self, remedy: str = "", *settings: Setting) -> None:
@@ -159,10 +161,25 @@ class Several(ArgumentError):
     """Several errors in one message."""
 
     def __init__(self, errors: Sequence[Exception], remedy: str = "", *settings: Setting) -> None:
-        lines = [f"  {number}. {error}" for number, error in enumerate(errors, 1)] + [remedy] * bool(remedy)
+        said = _said(errors)
+        lines = [f"  {number}. {text}" for number, text in enumerate(said, 1)]
         named = [setting for error in errors for setting in getattr(error, "settings", ())]
-        super().__init__("\n".join([f"{len(errors)} problems:", *lines]), *named, *settings)
+        text = "\n".join([f"{len(said)} problems:", *lines]) if len(said) > 1 else said[0]
+        super().__init__("\n".join([text, *[remedy] * bool(remedy)]), *named, *settings)
         self.errors = tuple(errors)
+
+
+def _said(errors: Sequence[Exception]) -> list[str]:
+    """What errors say, those that differ in the file only as one."""
+    places: dict[str, list[str]] = {}
+    for error in errors:
+        where = error.where if isinstance(error, ArgumentError) and str(error).startswith(error.where) else ""
+        places.setdefault(str(error).removeprefix(where), []).append(where)
+    said = []
+    for text, (first, *more) in places.items():
+        others = ", ".join(filter(None, more))
+        said.append(f"{first}{text}" + f" The same in {others}." * bool(others))
+    return said
 
 
 Untyped: TypeAlias = Any  # an object of a library that states no types

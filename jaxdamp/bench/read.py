@@ -177,7 +177,7 @@ def _read_files(
     all_wrong, names = Problems(), _names(files)
     for file, name in zip(files, names, strict=True):
         wrong = Problems()
-        with wrong.collected():
+        with wrong.collected(str(file)):
             try:
                 good += records(read_tables(file, readers, given["delimiter"]), name, wrong)
             except ArithmeticError as error:

@@ -150,7 +150,7 @@ def sides_of(table: RawTable, choice: Choice) -> tuple[list[Side], list[str]]:
     units, found, problems, missing = {"velocity": unit}, [], Problems(), 0
     of_name = _direction_of_name(table, velocity)
     for index in forces:
-        with problems.collected():
+        with problems.collected(table.where):
             force, units["force"] = in_si(table, index, "force", choice)
             there = np.isfinite(velocity) & np.isfinite(force)
             missing += int(np.sum(~there))

@@ -128,6 +128,8 @@ def test_arrays_of_structures_and_matrices_in_mat(tmp_path):
     same(runs[1])
     scipy.io.savemat(tmp_path / "b.mat", {"data": np.stack([T, X, F], axis=1)})
     where = {"time": "data[0]", "stroke": "data[1]", "force": "data[2]"}
+    with pytest.raises(ValueError, match=r'no names: pass .*columns=\{"time": 0, "stroke": 1, "force": 2\}, units='):
+        read(tmp_path / "b.mat")
     same(read(tmp_path / "b.mat", columns=where, units={"time": "s", "stroke": "mm", "force": "N"})[0])
 
 

@@ -1,5 +1,7 @@
 """Text files as benches and loggers write them: time stamps, text columns, bars, footers, decimal signs."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -194,6 +196,14 @@ def test_all_problems_of_a_file_in_one_message(write):
         ValueError, match=r"(?s)2 problems:.*1\. .*'x' \(stroke\) names no unit.*2\. .*'F' \(force\) names no"
     ):
         read(write(header="t_s,x,F"))
+
+
+def test_a_problem_of_several_files_is_said_once(write, tmp_path):
+    files = [write(f"{name}.csv", header="t_s,x,F") for name in ("a", "b", "c")]
+    others = rf"The same in {re.escape(str(files[1]))}, {re.escape(str(files[2]))}\."
+    said = rf"(?s)^2 problems:\n.*a\.csv, column 'x'[^\n]*{others}\n.*a\.csv, column 'F'[^\n]*{others}$"
+    with pytest.raises(ValueError, match=said):
+        read(tmp_path)
 
 
 def test_all_problems_of_a_folder_and_skipping_them(write, tmp_path):
