@@ -3,9 +3,9 @@
 import csv
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import chain, compress, islice, pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,11 +18,12 @@ from jaxdamp.bench.units import is_unit, is_usual
 
 
 DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "white space", "|": "vertical bar"}
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*([eEdD][+-]?\d+)?|\.\d+([eEdD][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
+NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*(?:[eEdD][+-]?\d+)?|\.\d+(?:[eEdD][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
+_NUMBER_OR_NOT = re.compile(rf"^(?:({NUMBER.pattern})|.*)$", re.IGNORECASE | re.MULTILINE)  # of cells, one a line
 # A number with a decimal comma or with thousands set apart, in a cell that holds more than a number as it is read.
 GROUPED = re.compile(r"[+-]?\d+(?:,\d+|(?:[ '\u2019\u00a0\u202f]\d{3})+)(?:[.,]\d+)*")
 PLAINLY = "export the file with decimal points and without a sign for thousands"
-_DIGIT = re.compile(r"\d")
+_DIGITS = re.compile(r"\d+")
 _NUMERIC = 0.9  # share of numbers that makes a column one of the record rather than one with gaps
 Rows = Sequence[tuple[int, list[str]]]  # number of the line, from 1, and its cells
 
@@ -96,10 +97,10 @@ def layout_of(rows: Rows, delimiter: str) -> Layout | None:
     cells, numbers, values = _rows_of_one_width(rows, delimiter)
     if not cells:
         return None
-    filled = np.array([[bool(cell) for cell in row] for row in cells])
+    filled = [sum(map(bool, column)) for column in zip(*cells, strict=True)]
     full = np.flatnonzero(values.sum(axis=0) >= _NUMERIC * len(cells))
-    numeric = np.flatnonzero(2 * numbers.sum(axis=0) > filled.sum(axis=0))
-    digits = len(_DIGIT.findall(" ".join(cells[row][column] for row, column in np.argwhere(values))))
+    numeric = np.flatnonzero(2 * numbers.sum(axis=0) > filled)
+    digits = sum(map(len, _DIGITS.findall(" ".join(compress(chain.from_iterable(cells), values.flat)))))
     return (
         Layout(delimiter, len(cells[0]), tuple(full.tolist()), tuple(numeric.tolist()), digits) if len(full) else None
     )
@@ -108,15 +109,23 @@ def layout_of(rows: Rows, delimiter: str) -> Layout | None:
 def _rows_of_one_width(rows: Rows, delimiter: str) -> tuple[list[list[str]], np.ndarray, np.ndarray]:
     """The rows with numbers that have the most frequent width, and which of their cells are numbers, and values."""
     chosen = []
+    found = _are_numbers([cell for _, cells in rows for cell in cells], delimiter)
     for _, cells in rows:
-        numbers = [is_number(cell, delimiter) for cell in cells]
-        values = [is_number or is_stamp(cell) for is_number, cell in zip(numbers, cells, strict=True)]
-        if any(numbers) and sum(values) >= min(2, len(cells)):
-            chosen.append((cells, numbers, values))
+        numbers = [*islice(found, len(cells))]
+        if any(numbers):
+            values = numbers if all(numbers) else [n or is_stamp(cell) for n, cell in zip(numbers, cells, strict=True)]
+            if sum(values) >= min(2, len(cells)):
+                chosen.append((cells, numbers, values))
     widths = Counter(len(cells) for cells, _, _ in chosen)
     width = widths.most_common(1)[0][0] if widths else 0
-    chosen = [row for row in chosen if len(row[0]) == width]
-    return [row[0] for row in chosen], np.array([row[1] for row in chosen]), np.array([row[2] for row in chosen])
+    cells, numbers, values = ([row[part] for row in chosen if len(row[0]) == width] for part in range(3))
+    return cells, np.array(numbers), np.array(values)
+
+
+def _are_numbers(cells: Sequence[str], delimiter: str) -> Iterator[bool]:
+    """Which of many cells hold a number, found at once: one by one they take as long as all other reading."""
+    one_a_line = "\n".join([cell.replace("\n", " ") for cell in cells])
+    return map(bool, _NUMBER_OR_NOT.findall(with_point(one_a_line, delimiter)))
 
 
 class Header(NamedTuple):

@@ -76,3 +76,11 @@ def test_formulas_without_values_are_named(tmp_path):
         read(workbook(tmp_path / "a.xlsx", only=all_of_them))
     mean = [*rows(), ("mean", None, "=AVERAGE(C2:C301)")]
     np.testing.assert_array_equal(read(workbook(tmp_path / "a.xlsx", only=mean))[0].force, F)
+
+
+def test_a_cell_of_several_lines_is_one_cell(tmp_path):
+    """A note typed beside the numbers, with line breaks and numbers of its own."""
+    lines = [(*row, None) for row in rows()]
+    lines[5] = (*lines[5][:3], "warm\n30\nagain from here\n31")
+    run = read(workbook(tmp_path / "a.xlsx", only=lines))[0]
+    np.testing.assert_array_equal(run.force, F)
