@@ -247,7 +247,7 @@ def fit_laws(
                 outcomes.append(outcome)
                 if isinstance(outcome, Rung):
                     interrupt.keep()
-                    screen.points([f"{outcome.name}: RMSE {outcome.error:.4g} N"])
+                    screen.points([f"{outcome.name}: {outcome.error_in_words}"])
         except Interrupted:
             if not any(isinstance(outcome, Rung) for outcome in outcomes):
                 raise

@@ -87,6 +87,16 @@ class Rung(NamedTuple):
         return EXACT * max(float(np.abs(run.force).max()) for run in self.result.runs)
 
     @property
+    def is_exact(self) -> bool:
+        """Whether its error is below `floor`: what is left is rounding, with which nothing can be compared."""
+        return self.error <= self.floor
+
+    @property
+    def error_in_words(self) -> str:
+        """Its error [N], or that it is below `floor`."""
+        return f"RMSE less than {self.floor:.2g} N" if self.is_exact else f"RMSE {self.error:.4g} N"
+
+    @property
     def errors(self) -> tuple[float, ...]:
         """RMSE [N] on each record or part of a record that was held out."""
         return tuple(max(score.rmse, self.floor) for score in self.scores)
@@ -192,8 +202,11 @@ def why(choice: Recommendation[R], rungs: Sequence[R], kind: str = "law", made: 
         words = f"With {numbers} numbers it is the simplest of {names}, which predict alike within the scatter"
     else:
         next_best = min((rung.error for rung in rungs if rung is not best), default=best.error)
-        factor = next_best / best.error if best.error > 0 else np.inf
-        words = f"No other {kind} predicts as well: the next error is {factor:.2f} times as large"
+        least = max(best.error, best.floor)
+        factor = max(next_best, best.floor) / least if least > 0 else np.inf
+        exact = best.error <= best.floor
+        size = "it leaves no error to compare with" if exact else f"the next error is {factor:.2f} times as large"
+        words = f"No other {kind} predicts as well: {size}"
         if factor <= 1.0 + ALIKE:
             words = f"With {numbers} numbers it predicts as well as any {kind} whose numbers are all known"
     if best.doubt:
@@ -221,9 +234,9 @@ def verdict(choice: Recommendation[Rung], rungs: Sequence[Rung], held_out: Seque
     best = choice.rung
     moved = not all(run.of_points for run in best.result.runs)  # a table has no hysteresis to be followed
     static = [rung for rung in rungs if moved and is_memoryless(rung.result.law)]
+    rung = best if is_memoryless(best.result.law) or not static else recommendation(static).rung
     sentences = [_error_of(best, rungs, held_out), *why(choice, rungs, made=best.reduced)]
-    if static:
-        rung = best if is_memoryless(best.result.law) else recommendation(static).rung
+    if static and not rung.is_exact:
         part = rung.result.error_shares.hysteresis
         lead = "It is a law of velocity alone" if rung is best else f"The best law of velocity alone is {rung.name}"
         if part >= HYSTERESIS:
@@ -236,13 +249,15 @@ def verdict(choice: Recommendation[Rung], rungs: Sequence[Rung], held_out: Seque
         if rung is best and part >= HYSTERESIS and len(static) == len(rungs):
             sentences.append("Try a law with hysteresis, such as besinger_lag or besinger_series_spring.")
         elif rung is not best:
-            factor = rung.error / best.error
+            factor = rung.error / max(best.error, best.floor)
             sentences.append(f"{best.name} has a {factor:.1f} times smaller error.")
     return (*sentences, *_remaining(best, rungs))
 
 
 def _remaining(best: Rung, rungs: Sequence[Rung]) -> list[str]:
     """Sentences on hysteresis and shape that the recommended law has not followed."""
+    if best.is_exact:
+        return []
     sentences, remaining = list[str](), best.result.error_shares
     if not is_memoryless(best.result.law) and remaining.hysteresis >= HYSTERESIS:
         sentences.append(f"{100 * remaining.hysteresis:.0f} % of the squared error of {best.name} is still hysteresis.")
@@ -257,10 +272,10 @@ def _remaining(best: Rung, rungs: Sequence[Rung]) -> list[str]:
 def _error_of(best: Rung, rungs: Sequence[Rung], held_out: Sequence[BenchRun]) -> str:
     percent = best.fit_percent if best.held_out_fit_percent is None else best.held_out_fit_percent
     largest = max(float(abs(run.force).max()) for run in held_out or best.result.runs)
-    share = 100 * best.error / largest
+    share = f"{100 * best.floor / largest:.2g}" if best.is_exact else f"{100 * best.error / largest:.1f}"
     lead = f"Recommended: {best.name}" if len(rungs) > 1 else f"Error of {best.name}"
     where = (
         f"held-out fit {percent:.1f} %" if best.judged_on else f"fit {percent:.1f} % on the records it was fitted to"
     )
     how = f" ({best.judged_on})" if best.judged_on else "; nothing could be held out"
-    return f"{lead}, {where}, RMSE {best.error:.4g} N, {share:.1f} % of the largest force of {largest:.0f} N{how}."
+    return f"{lead}, {where}, {best.error_in_words}, {share} % of the largest force of {largest:.0f} N{how}."

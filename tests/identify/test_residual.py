@@ -68,6 +68,13 @@ def test_the_verdict_names_the_law_that_has_what_the_static_one_lacks() -> None:
     assert third == f"lagging has a {rungs['linear'].error / rungs['lagging'].error:.1f} times smaller error."
 
 
+def test_an_exact_law_leaves_no_error_to_compare_with() -> None:
+    comparison = identify.compare({"linear": Linear, "bilinear": Bilinear}, tuple(_runs(Bilinear(3000.0, 1000.0), 0.0)))
+    first, why = comparison.verdict
+    assert "RMSE less than 0.11 N, 0.01 % of the largest force" in first
+    assert why == "No other law predicts as well: it leaves no error to compare with."
+
+
 # ---- tables and plain data
 
 
