@@ -80,7 +80,7 @@ def test_formulas_without_values_are_named(tmp_path):
 
 def test_a_cell_of_several_lines_is_one_cell(tmp_path):
     """A note typed beside the numbers, with line breaks and numbers of its own."""
-    lines = [(*row, None) for row in rows()]
+    lines: list[tuple] = [(*row, None) for row in rows()]
     lines[5] = (*lines[5][:3], "warm\n30\nagain from here\n31")
     run = read(workbook(tmp_path / "a.xlsx", only=lines))[0]
     np.testing.assert_array_equal(run.force, F)
