@@ -26,6 +26,7 @@ WEAK = 0.5  # standard error, relative to the value or to the force, above which
 BOUND_Z_SCORE = 3.0  # standard errors beyond an edge from which a parameter counts as limited by it
 NEARLY = 9.0  # largest increase in chi-square of another minimum that is reported: three standard errors
 OFF = 1.0  # standard errors from the minimum by the derivatives, beyond which a search has not ended there
+GAIN = 0.1  # of the sum of squares by the derivatives, beyond which it has not, even if no number is determined
 APART = 3.0  # standard errors beyond which a parameter of another minimum counts as different
 TAKES_PART = 0.1  # force of a parameter in a direction, relative to the largest, above which it belongs to it
 AT_LIMIT = 1e-4  # distance from a limit given by other parameters, relative to the start, that counts as zero
@@ -39,7 +40,7 @@ class Estimates(NamedTuple):
     minima: tuple[Minimum, ...]
     notes: tuple[str, ...]
     summary: tuple[str, ...]  # of the notes, with groups of numbers named once
-    unsettled: tuple[str, ...] = ()  # numbers that seem certain, but are not where the derivatives place the minimum
+    unsettled: tuple[str, ...] = ()  # numbers that are not where the derivatives place the minimum
 
 
 def estimate(problem: Problem, solution: Solution, noise: Noise) -> Estimates:
@@ -83,17 +84,25 @@ def estimate(problem: Problem, solution: Solution, noise: Noise) -> Estimates:
     summary = (*in_groups(estimates), *further)
     sure = np.array([not e.note for e in estimates])
     ended = found.converged and not solution.closed_form and not problem.is_rounding(found.squares)
-    off = sure & _off(found, noise, sides == 0) if ended else np.zeros_like(sure)
+    off = _off(found, noise, sides == 0, sure) if ended else np.zeros_like(sure)
     unsettled = tuple(np.array(free.names)[off])
     return Estimates(estimates, uncertain.covariance, minima, (*notes, *further), summary, unsettled)
 
 
-def _off(found: SearchEnd, noise: Noise, inside: Bool[np.ndarray, " free"]) -> Bool[np.ndarray, " free"]:
-    """Which numbers are far from where the derivatives place the minimum. Those at ends of their ranges stay there."""
+def _off(
+    found: SearchEnd, noise: Noise, inside: Bool[np.ndarray, " free"], sure: Bool[np.ndarray, " free"]
+) -> Bool[np.ndarray, " free"]:
+    """Which sure numbers are far from where the derivatives place the minimum; all if none is, but the squares are.
+
+    Those at ends of their ranges stay there.
+    """
     off, jacobian = np.zeros(inside.size, bool), found.jacobian[:, inside]
     reachable = np.linalg.norm(orthonormal(jacobian).T @ found.residual)
     if reachable > OFF * np.sqrt(noise.variance):  # no number is farther off than all together
         off[inside] = np.abs(uncertainty(jacobian, found.residual, noise).unconstrained_step) > OFF
+        off &= sure
+        if not off.any() and reachable**2 > GAIN * found.squares:
+            return inside
     return off
 
 

@@ -28,7 +28,7 @@ from jaxdamp.identify.contradicting import contradicting
 from jaxdamp.identify.covered import covered_range
 from jaxdamp.identify.criteria import against_priors
 from jaxdamp.identify.estimates import Estimate
-from jaxdamp.identify.estimating import Estimates, estimate, on_misfit
+from jaxdamp.identify.estimating import GAIN, Estimates, estimate, on_misfit
 from jaxdamp.identify.identifiability import gas_in_words
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.left_out import left_out
@@ -62,6 +62,14 @@ ALIKE = 0.1  # of their mean, by which values of records may differ to count as 
 DRAWS = 6  # perturbations, each with both signs
 
 
+class NotFiniteError(_checks.ArgumentError):
+    """A law without finite forces and derivatives over its records."""
+
+    def __init__(self, law: AbstractDamper) -> None:
+        must, remedy = "give finite forces and derivatives over the records", coverage(law) or "Start from another law."
+        super().__init__(f"Argument `law` must {must}, but is {law}, which does not. {remedy}", argument="law")
+
+
 @one_thread()
 def judge(problem: Problem, solution: Solution, *, force_noise: float | None = None) -> FitResult:
     """The third step of `fit`: the result at the minimum, with standard errors and warnings.
@@ -76,10 +84,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     """
     best, problem = solution.best, problem.at_noise(solution.noise)
     if not best.finite:
-        must = "give finite forces and derivatives over the records"
-        _checks.refuse(
-            "law", must, f"{problem.law}, which does not", coverage(problem.law) or "Start from another law."
-        )
+        raise NotFiniteError(problem.law)
     noise = noise_of(problem, best, force_noise)
     estimates = estimate(problem, solution, noise)
     models, model = fitted_models(problem, best.values)
@@ -158,10 +163,10 @@ def on_status(best: SearchEnd, unsettled: Sequence[str], remedy: str = "") -> li
     differ = "differs" if len(unsettled) == 1 else "differ"
     who = ", ".join(unsettled[:3]) + f" and {len(unsettled) - 3} others" * (len(unsettled) > 3)
     return [
-        f"The search did not converge: it ended where {who} {differ} by more than a standard error from the minimum "
-        "that the derivatives show, at a kink of the sum of squares, such as a knot at a sample, or by a loose "
-        "tolerance. Other values fit nearly as well. Freeze the numbers that place kinks, such as knots, or take a law "
-        "with fewer."
+        f"The search did not converge: it ended where {who} {differ} by more than a standard error, or the sum of "
+        f"squares by more than {100 * GAIN:.0f} %, from the minimum that the derivatives show: at a kink of the sum of "
+        "squares, such as a knot at a sample, by a loose tolerance, or where no step went on. Other values fit as well "
+        "or better. Start elsewhere, freeze the numbers that place kinks, such as knots, or take a law with fewer."
     ]
 
 

@@ -22,6 +22,7 @@ from jaxdamp.identify.contradicting import refuse_several_laws
 from jaxdamp.identify.criteria import LOSSES, Priors
 from jaxdamp.identify.dependence import OWN, Dependence, Products, dependence
 from jaxdamp.identify.initial_states import INITIAL_STATES
+from jaxdamp.identify.judging import NotFiniteError
 from jaxdamp.identify.lanes import Lanes, by_rounds, judged
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import Machine
@@ -214,25 +215,40 @@ def _one_by_one(
     records: Sequence[tuple[BenchRun, ...]], law: AbstractDamper, free: FreeParameters, how: Options, prefix: str
 ) -> dict[str, Any]:
     """Each damper by a fit of its own; the paths of its law begin with the prefix."""
-    from jaxdamp.identify.fitting import fit  # which hands many dampers to this file
+    results = [_alone(law, runs, how) for runs in records]
 
-    results = [fit(law, runs, **how) for runs in records]
+    def each(read: Callable[[FitResult], object], size: int | tuple[int, ...] = ()) -> np.ndarray:
+        return np.array([np.full(size, np.nan) if result is None else read(result) for result in results])
 
-    def each(read: Callable[[FitResult], object]) -> np.ndarray:
-        return np.array([read(result) for result in results])
-
-    numbers = each(lambda result: [_mean_over_records(result, prefix + name) for name in free.names])
+    names = [prefix + name for name in free.names]
+    numbers = each(lambda result: [_mean_over_records(result, name) for name in names], (len(names), 3))
     return {
         "values": numbers[..., 0],
         "standard_errors": numbers[..., 1],
         "bias": numbers[..., 2] if how["input_noise"] else None,
         "fit_percent": each(lambda result: result.fit_percent),
         "rmse": each(lambda result: result.rmse),
-        "status": tuple(result.status for result in results),
-        "steps": each(lambda result: result.steps),
-        "record_rmse": tuple(np.array([score.rmse for score in result.scores]) for result in results),
+        "status": tuple(Status.LEFT_OUT if result is None else result.status for result in results),
+        "reasons": tuple(NOT_FINITE * (result is None) for result in results),
+        "steps": np.array([0 if result is None else result.steps for result in results]),
+        "record_rmse": tuple(map(_record_errors, results, records)),
         "share_left_out": each(lambda result: result.evidence.problem.share_left_out if result.evidence else 0.0),
     }
+
+
+def _alone(law: AbstractDamper, runs: tuple[BenchRun, ...], how: Options) -> FitResult | None:
+    """The fit of one damper; None where its law has no finite force."""
+    from jaxdamp.identify.fitting import fit  # which hands many dampers to this file
+
+    try:
+        return fit(law, runs, **how)
+    except NotFiniteError:
+        return None
+
+
+def _record_errors(result: FitResult | None, runs: Sequence[BenchRun]) -> Float[np.ndarray, " records"]:
+    """The RMSE [N] of each record, NaN without a fit."""
+    return np.full(len(runs), np.nan) if result is None else np.array([score.rmse for score in result.scores])
 
 
 def _mean_over_records(result: FitResult, path: str) -> tuple[float, float, float]:

@@ -37,6 +37,7 @@ ROUNDING = 500.0  # rounding errors of a sum of squares, in those of one number
 SLACK = 1e-9  # beyond a limit, that is a rounding error: a limit of one coordinate may stand twice
 WORTH = 0.1  # standard errors: a decrease that counts, where the damping begins anew
 LEAST_SCALE = 1e-2  # of that before, where the damping begins anew: what the data hardly show would run away
+LEAST_OF_LARGEST = 1e-7  # of the largest scale: what the data do not show at the start would run away too
 PATIENCE = 30  # points tried without one
 KINK = 0.01  # standard errors: a refused step that is predicted to gain less will only become shorter
 TOGETHER = 5  # solutions of one step, after which one limit at a time is exchanged, which ends
@@ -276,6 +277,7 @@ def _damped_step(
     n = state.scale.shape[-1]
     r, q, conditions = state.triangle[..., :n, :n], state.triangle[..., :n, n], state.conditions
     scale = xp.where(state.scale > 0, state.scale, 1.0)
+    scale = xp.maximum(scale, LEAST_OF_LARGEST * xp.max(scale, axis=-1)[..., None])
     share = xp.maximum(FIRST_DAMPING / xp.maximum(step_size, jnp.finfo(scale.dtype).tiny), LEAST_DAMPING)
     damping = xp.sqrt(share)[..., None] * scale
     firm = FIRM * xp.maximum(xp.max(scale, axis=-1), 1.0)[..., None]

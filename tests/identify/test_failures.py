@@ -84,17 +84,22 @@ class Seized(AbstractMemoryless):
 
 
 @pytest.mark.filterwarnings("ignore:1 of 2 dampers were left out")
-@pytest.mark.parametrize("rate", [150.0, 1000.0])  # Hz, without and with means of samples
-def test_one_damper_of_many_where_the_law_has_no_force_is_left_out(rate):
+@pytest.mark.parametrize(
+    ("rate", "alone"),  # Hz, without and with means of samples; then each damper by a fit of its own
+    [(150.0, {}), (1000.0, {}), (150.0, {"per_record": ["rate"]}), (150.0, {"input_noise": (1e-5, 2e-3)})],
+)
+def test_one_damper_of_many_where_the_law_has_no_force_is_left_out(rate, alone):
     """It stopped the others, or had the start as its numbers, with which no damper stood out any more."""
     dyno = VirtualDyno(Linear(1500.0), sampling_rate=rate, force_noise=5.0)
     slow, fast = (list(dyno.run(SineTest(0.02, f, cycles=3))) for f in (1.0, 3.0))
-    many = fit_many(Seized(1000.0), {"slow": slow, "fast": fast})
+    many = fit_many(Seized(1000.0), {"slow": slow, "fast": fast}, **alone)
     assert float(get(many["slow"], "rate")) == pytest.approx(1500.0, rel=0.01)
     assert many.warnings == (f"fast: it was left out: {many.reasons[1]}",) and "no finite force" in many.reasons[1]
     assert "1 of them left out: mean fit 9" in many.summary
     with pytest.raises(ValueError, match="fast"):
         many["fast"]
-    for dampers, shared in (({"fast": fast}, []), ({"slow": slow, "fast": fast}, ["rate"])):
+    with pytest.raises(ValueError, match=r"over the records of all dampers, but is Seized.* does not for fast"):
+        fit_many(Seized(1000.0), {"fast": fast}, **alone)
+    if not alone:
         with pytest.raises(ValueError, match=r"over the records of all dampers, but is Seized.* does not for fast"):
-            fit_many(Seized(1000.0), dampers, shared=shared)
+            fit_many(Seized(1000.0), {"slow": slow, "fast": fast}, shared=["rate"])

@@ -13,6 +13,7 @@ from jaxdamp.identify.held_out import on_records
 from jaxdamp.identify.record_starts import first_samples, warmed
 from jaxdamp.parameters import get, replace
 from jaxdamp.rig import Rig
+from jaxdamp.solve import BoundedLevenbergMarquardt
 
 
 class How(TypedDict):
@@ -147,6 +148,16 @@ def test_a_stated_temperature_has_a_unit(text, kelvin, hot):
         with pytest.raises(ValueError, match=r"temperature of .* with its unit, but is .*80 degC"):
             fit(BEGIN, run, **HOW)
     assert fit(Linear(1000.0), run).fit_percent > 50.0  # it says nothing of a law that follows no temperature
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e4])
+def test_a_fit_whose_numbers_are_all_unknown_does_not_converge_far_from_the_minimum(runs, tolerance):
+    """Steps of a billion kelvin, which change nothing, were refused until none was left; all errors were large."""
+    how = {**HOW, "freeze": ["sensitivity", "friction_velocity"]}
+    insensitive = replace(BEGIN, {"sensitivity": 1e-12})
+    result = fit(insensitive, runs[0], rig=None, solver=BoundedLevenbergMarquardt(tolerance=tolerance), **how)
+    assert (result.rmse < 1.1 * NOISE) == result.converged == (tolerance < 1.0)
+    assert result.converged or "sum of squares by more than 10 %" in result.warnings[0]
 
 
 def test_settings_with_units_are_read_from_manifests_and_names(tmp_path, hot):

@@ -171,6 +171,20 @@ def test_a_column_without_effect_leaves_a_finite_step():
     assert not state.stuck[0]
 
 
+def test_an_unknown_that_the_start_hardly_shows_does_not_stop_the_others():
+    """A step of a billion in it, which was damped by nothing, was refused until no step was left: converged."""
+    velocity, heat = np.sin(20.0 * TIME), 1.0 - np.exp(-TIME)
+
+    def at(y, lanes):
+        rate, slope, rise = y[0]
+        misses = (rate - 2.0 - 1e-12 * rise) * velocity + slope * (heat + rise) - 0.1 * (heat + 2.0)
+        rows = np.stack([velocity, heat + rise, slope - 1e-12 * velocity, misses], axis=1)
+        return Linearisation(rows[None], np.zeros((1, 0)), np.zeros((1, 0, 3)), np.full(1, 50.0)), misses @ misses
+
+    end = least_squares_on_host(at, BoundedLevenbergMarquardt(), np.array([[1.0, 0.0, 0.0]]), 200)
+    assert end.status == [Status.CONVERGED] and end.aux < 1e-6
+
+
 def test_a_start_without_finite_residual_has_no_step():
     end = on_host(DATA[None] * np.nan, BoundedLevenbergMarquardt(lower=np.zeros(2), upper=np.full(2, np.inf)))
     assert end.status == [Status.NO_STEP] and end.steps[0] == 1
