@@ -11,11 +11,15 @@ from jaxdamp.rig import Rig
 
 
 OF_RIG = "rig."
+LAG = "command_lag", f"{OF_RIG}command_lag"  # its name and its path
 Limits = dict[str, tuple[float, float]]
 
 
 class AtLevel(NamedTuple):
-    """The choices of a call for the law at one setting: by their paths, names mean the same beside other settings."""
+    """The choices of a call for the law at one setting: by their paths, names mean the same beside other settings.
+
+    Or those on the lag of the actuator, by name.
+    """
 
     freeze: list[str]
     bounds: Limits
@@ -52,10 +56,28 @@ def choices_at(at: AtSetting, level: str, asked: Free, beside: Collection[str]) 
     return AtLevel([*map(place, held)], of_free("bounds", asked["bounds"]), of_free("priors", asked["priors"]))
 
 
-def choices_of(alone: Iterable[AtSetting], place: str, asked: Free, tie: Mapping[str, str], rig: Rig | None) -> Free:
-    """The choices at all settings, with all ties; a prior of tied numbers is one of the number that they follow."""
-    lag = [f"{OF_RIG}command_lag"] * (rig is not None and bool(rig.command_lag))
-    freeze, bounds, priors = list[str](), Limits(), Limits()
+def of_lag(asked: Free, *, lag: bool) -> AtLevel:
+    """The choices on the lag of the actuator, or all others: the lag is no number where commands are held."""
+
+    def limits(given: Mapping[str, tuple[float, float]] | None) -> Limits:
+        if not isinstance(given, Mapping):
+            return {} if lag or given is None else given  # what is none is refused where it is used
+        return {name: pair for name, pair in given.items() if (name in LAG) == lag}
+
+    frozen = [name for name in name_patterns("freeze", asked["freeze"]) if (name in LAG) == lag]
+    return AtLevel(frozen, limits(asked["bounds"]), limits(asked["priors"]))
+
+
+def choices_of(
+    alone: Iterable[AtSetting], place: str, asked: Free, tie: Mapping[str, str], rig: Rig | None, on_lag: AtLevel
+) -> Free:
+    """The choices at all settings, with all ties; a prior of tied numbers is one of the number that they follow.
+
+    `on_lag` are those on the lag of the actuator, if the machine has one.
+    """
+    lag, freeze, bounds, priors = list[str](), list[str](), Limits(), Limits()
+    if rig is not None and rig.command_lag:
+        lag, freeze, bounds, priors = [LAG[1]], [*on_lag.freeze], {**on_lag.bounds}, {**on_lag.priors}
     for k, at in enumerate(alone):
         level = choices_at(at, f"{place}.{k}.", asked, lag)
         freeze += level.freeze

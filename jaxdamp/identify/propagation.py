@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.special
+from jax.core import Tracer
 from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
@@ -127,15 +128,21 @@ def propagate(
         value = _on_host(compiled_for_loops(of)(centre))
         return over_samples(of, jnp.asarray(evidence.draws(samples, seed), centre.dtype), value)
 
-    value, slopes = _on_host(compiled_for_loops(with_jacobian(of))(centre))
+    slanted = numbers_of(function, evidence.model, by_derivatives=True)
+    value, slopes = _on_host(compiled_for_loops(with_jacobian(slanted))(centre))
     error = jax.tree.map(lambda slope: np.asarray(standard_error(slope, evidence.covariance)), slopes)
     lower = jax.tree.map(lambda v, e: v - evidence.quantile * e, value, error)
     upper = jax.tree.map(lambda v, e: v + evidence.quantile * e, value, error)
     return Propagated(value, error, lower, upper)
 
 
-def numbers_of(function: Callable[[PyTree], PyTree], model: Callable[[Array], PyTree]) -> Callable[[Array], PyTree]:
-    """A user's function of a model as one of its free numbers, which returns arrays in the user's structure."""
+def numbers_of(
+    function: Callable[[PyTree], PyTree], model: Callable[[Array], PyTree], *, by_derivatives: bool = False
+) -> Callable[[Array], PyTree]:
+    """A user's function of a model as one of its free numbers, which returns arrays in the user's structure.
+
+    By derivatives, truths and counts that are computed are refused: their derivatives are zero, their errors are not.
+    """
 
     def of(values: Array) -> PyTree:
         result = function(model(values))
@@ -143,6 +150,10 @@ def numbers_of(function: Callable[[PyTree], PyTree], model: Callable[[Array], Py
         if not leaves or not all(eqx.is_array_like(leaf) and not jnp.iscomplexobj(leaf) for leaf in leaves):
             remedy = "Return a number, an array, or a dict or other pytree of them."
             _checks.refuse("function", "return real numbers", _checks.described(result), remedy)
+        for kind in {str(leaf.dtype) for leaf in leaves if isinstance(leaf, Tracer)} if by_derivatives else ():
+            if not jnp.issubdtype(kind, jnp.inexact):
+                must, remedy = "return numbers that have derivatives", "Give `samples=1000`, or return what it is from."
+                _checks.refuse("function", must, f"one that returns {kind}", remedy)
         return jax.tree.map(lambda leaf: jnp.asarray(leaf, float), result)
 
     return of

@@ -72,7 +72,7 @@ class Fit(AbstractResult):
                 a number, an array, or a dict or other pytree of them.
             samples: number of models drawn from the uncertainty of the parameters within their domains, for functions
                 that are not straight within it. If it is left out, the derivatives at the fit are used, which know no
-                domain: the interval of a mass of 1 ± 2 kg then begins below zero.
+                domain: the interval of a mass of 1 ± 2 kg then begins below zero. Truths and counts need samples.
             seed: of the samples.
 
         Returns:

@@ -18,7 +18,7 @@ from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Figure
 from jaxdamp.bench import BenchRun, as_runs, contradictions, usable
 from jaxdamp.dampers import Scheduled, takes_command
-from jaxdamp.identify.at_levels import choices_of, ties_at
+from jaxdamp.identify.at_levels import AtLevel, choices_of, of_lag, ties_at
 from jaxdamp.identify.blending import AtSetting, Choice, choose_blend, with_blended_forces
 from jaxdamp.identify.contradicting import refuse_contradicting
 from jaxdamp.identify.estimating import undetermined
@@ -210,7 +210,11 @@ def fit_scheduled(
     held_rig, lag = without_command_lag(rig)
     refuse_lag_of_held(lag > 0.0, runs)
     how: FitSettings = {**part(settings, FIT), "freeze": frozen, "bad_records": "keep"}
-    chain = Chain(law, runs, settings["common"], held_rig, lag, how)
+    on_lag = of_lag(how, lag=True)
+    if lag:
+        freeze, bounds, priors = of_lag(how, lag=False)
+        how = {**how, "freeze": freeze, "bounds": bounds, "priors": priors}
+    chain = Chain(law, runs, settings["common"], held_rig, lag, on_lag, how)
     with Progress("Fitting by setting") as line:
         shown = progress or line
         alone = chain.alone(chain.settings, shown)
@@ -238,6 +242,7 @@ class Chain:
     common: Sequence[str]
     rig: Machine  # without the lag of the actuator, which shows only where the command varies
     command_lag: float  # s, its start; 0 where none is fitted
+    on_lag: AtLevel  # what the call says of it
     how: FitSettings
     own: Alone = dataclasses.field(default_factory=dict)  # the fit at a setting from the start of the law there
 
@@ -305,7 +310,7 @@ class Chain:
         tie = {f"{place}.{k}.{path}": f"{place}.0.{path}" for path in shared for k in range(1, len(laws))}
         for k, at in enumerate(alone.values()):
             tie |= ties_at(at, f"{place}.{k}.", self.how["tie"])
-        chosen = choices_of(alone.values(), place, self.how, tie, machine)
+        chosen = choices_of(alone.values(), place, self.how, tie, machine, self.on_lag)
         blended = tuple(with_values(law, means) for law in laws)
         at_levels = Scheduled.of_equal_structure(laws) and not (varying and blend == "force")
         scheduled = Scheduled(blended, list(alone), min(alone), "parameters" if at_levels else "force")

@@ -75,6 +75,18 @@ def test_results_have_the_structure_that_the_function_returns(bilinear, samples)
             bilinear.propagate(wrong, samples=samples)
 
 
+def test_truths_and_counts_have_no_derivatives_but_samples(bilinear):
+    """Their errors were zero."""
+    rate = bilinear["rebound_rate"].value
+    for kind, of in (
+        ("bool", lambda law: law.rebound_rate > rate),
+        ("int", lambda law: jnp.round(law.rebound_rate).astype(int)),
+    ):
+        with pytest.raises(ValueError, match=f"derivatives, but is one that returns {kind}.*`samples=1000`"):
+            bilinear.propagate(of)
+        assert bilinear.propagate(of, samples=50).standard_error > 0.0
+
+
 def test_samples_of_knots_are_in_their_order(bilinear):
     """Of the normal distribution, six in ten are not."""
     law = PiecewiseLinear(np.array([-0.05, -0.02, 0.02, 0.05]), np.array([800.0, 2500.0, 4000.0, 1500.0, 900.0]))

@@ -72,6 +72,9 @@ def test_settings_and_varying_records_become_one_law(varying, held):
         identify.fit_scheduled(Bilinear, held, rig="command_lag")
     with pytest.raises(ValueError, match="have two commands or more that are held, but is records of none"):
         identify.fit_scheduled(Bilinear, varying)
+    how = {"rig": "command_lag", "blend": "parameters", "bounds": {"command_lag": (1e-3, 5e-3), "*rate": (1.0, 1e5)}}
+    bounded = identify.fit_scheduled(Bilinear, [*held, *varying], **how).result["command_lag"]
+    assert bounded.value == pytest.approx(5e-3, rel=1e-3) and bounded.note == "at a bound"  # settings alone have none
 
 
 @pytest.mark.parametrize(
