@@ -93,6 +93,12 @@ def test_of_a_law_with_other_numbers(name):
     assert first > 0 and others == [0, 0]
 
 
+def test_of_a_record_that_goes_on_from_a_state():
+    law, stroke = BoucWen(1500.0, 0.0, 300.0, 1e-3) + Spring(1500.0), 0.01 * (1.0 - np.cos(30.0 * TIME))
+    _, goes_on = in_calls(lambda state: respond(law, TIME, stroke, state=state), [None, np.array([1e-4])])
+    assert goes_on == 0
+
+
 def test_of_a_sweep_of_few_points_with_options_of_its_own(monkeypatch):
     monkeypatch.delenv("XLA_FLAGS")  # which states those of all tests
     first, second = in_calls(swept, [1400.0, 1600.0])

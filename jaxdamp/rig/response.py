@@ -27,7 +27,7 @@ from jaxdamp.dampers import (
     warn_outside,
 )
 from jaxdamp.parameters import as_float
-from jaxdamp.rig.marching import Followed, march_states, step_and_rate
+from jaxdamp.rig.marching import Followed, march_states, state_at_rest, step_and_rate
 from jaxdamp.rig.strokes import refuse_strokes
 
 
@@ -169,7 +169,10 @@ def respond(
         check_module("engine", engine, (AbstractLawEngine,), "respond(law, time, stroke, engine=...)")
         force = engine.respond(law, time, stroke, rate)
     else:
-        begin = None if state is None else _checked_state(law, state, followed)
+        if state is None:  # outside of the long program, which is then that of a given state too
+            begin = state_at_rest(followed.first(law), stroke[0] if known is None else known[0])
+        else:
+            begin = _checked_state(law, state, followed)
         force, last = march_states(law, dt, stroke, rate, substeps, followed, begin)
     if force.shape != time.shape:
         _checks.refuse("law", "give one number as force", f"{type(law).__name__}, which gives {force.shape[1:]}")
