@@ -10,6 +10,7 @@ from jaxdamp.simulation.equations import Equations, RoadInput, StepState as Step
 from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.fixed_step import AbstractFixedStep
 from jaxdamp.simulation.harmonic import HarmonicResponse as HarmonicResponse, harmonic_response
+from jaxdamp.simulation.many_designs import steepest as steepest
 from jaxdamp.simulation.notes import (
     far_outside as far_outside,
     named_laws as named_laws,

@@ -1,6 +1,7 @@
 """`Ride`: a vehicle on a road as one function of its parameters, the metrics gathered while it drives."""
 
 import copy
+import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
@@ -30,6 +31,7 @@ from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation.engine import AbstractEngine, check_control, chosen_engine
 from jaxdamp.simulation.equations import Equations, settled
 from jaxdamp.simulation.exponential import Exponential
+from jaxdamp.simulation.many_designs import can_follow, steepest_between
 from jaxdamp.simulation.notes import range_uses
 from jaxdamp.simulation.observer import MetricObserver, recorded
 from jaxdamp.simulation.run import refuse_stacked, run_check, sampled
@@ -70,10 +72,10 @@ class Ride(eqx.Module):
             (`vehicle.goal_metrics`), or a `metrics.Metric` of any channel; all ride metrics if left out. Fewer are
             faster.
         duration: as in `simulate`.
-        dt: as in `simulate`; it is checked here, with the numbers of this vehicle. Points far from it, of a sweep for
-            instance, are driven with the same steps unchecked.
-        substeps: of the exponential engine between two instants; as many as the laws of this vehicle need if left out.
-            For a ride made inside `jax.jit` see `simulate`.
+        dt: as in `simulate`; it is checked here, with the numbers of this vehicle. Points far from it are driven with
+            the same steps unchecked; in a `sweep` those that no step can follow fail.
+        substeps: of the exponential engine between two instants; as many as the laws of this vehicle need if left out,
+            in a `sweep` as many as the steepest end of its axes. For a ride made inside `jax.jit` see `simulate`.
         engine: as in `simulate`. One that is not `Exponential` may save the whole run.
 
     Raises:
@@ -93,6 +95,7 @@ class Ride(eqx.Module):
     engine: AbstractEngine  # with as many substeps as this vehicle needs
     layout: MemoryLayout = eqx.field(static=True)
     dt: float = eqx.field(static=True)
+    chooses_steps: bool = eqx.field(static=True)  # whether nobody asked for so many substeps
     metrics: tuple[Metric, ...] = eqx.field(static=True)
 
     def __init__(
@@ -121,7 +124,7 @@ class Ride(eqx.Module):
                     remedy = "Leave it out: the answer is that of the stationary motion, without a run."
                     _checks.refuse(name, "not be given on a white road", value, remedy)
             self.road, self.heights, self.dt = road, None, 1e-3
-            self.engine, self.layout = Exponential(), MemoryLayout.ARRAY
+            self.engine, self.layout, self.chooses_steps = Exponential(), MemoryLayout.ARRAY, False
             self.metrics = _stationary(vehicle, chosen, all_of_them=metrics is None)
             return
         engine, self.dt = chosen_engine(engine, Exponential(substeps=substeps), dt, substeps)
@@ -132,6 +135,7 @@ class Ride(eqx.Module):
             text = f"The road stays level for the whole run of {length:g} s: its bump comes later."
             warn(f"{text} Pass a longer `duration`, or an earlier `start` of the bump.")
         self.road = road if delays_by_itself(vehicle, road) else None
+        self.chooses_steps = isinstance(engine, Exponential) and engine.substeps is None
         self.engine = engine.prepared(run_check(vehicle, vehicle.system(), road, self.heights, self.dt))
         self.layout = self.engine.layout(2 * len(vehicle.coordinates), side_by_side=False)
         self.metrics = tuple(chosen)
@@ -190,6 +194,15 @@ class Ride(eqx.Module):
         object.__setattr__(other, "layout", self.engine.layout(states, side_by_side=True))
         return other
 
+    def reaching(self, columns: Mapping[str, np.ndarray]) -> "Ride":
+        """The same with as many substeps as the steepest of these values need, if they were not asked for."""
+        if not self.chooses_steps:
+            return self
+        count = steepest_between(self.vehicle, columns, self.dt)
+        assert isinstance(self.engine, Exponential)
+        engine = dataclasses.replace(self.engine, substeps=max(count, self.substeps))
+        return eqx.tree_at(lambda ride: ride.engine, self, engine)
+
     def printed_side_by_side(self) -> "Ride | None":
         """The same with its loop printed as C, if the engine allows it, numbers are double and a compiler is at hand.
 
@@ -235,7 +248,15 @@ class Ride(eqx.Module):
 
     def out_of_domain(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
         """Why the vehicle cannot have the values of each of many points: a text, empty where it can."""
-        return outside_domains(self.vehicle, columns)
+        reasons = outside_domains(self.vehicle, columns)
+        if isinstance(self.road, WhiteRoad) or not isinstance(self.engine, Exponential):
+            return reasons
+        for name, column in columns.items():
+            left = np.flatnonzero(reasons == "")
+            wrong = left[~can_follow(self.vehicle, name, column[left], self.dt, self.substeps)]
+            steps = f"{self.substeps} step{'s' * (self.substeps > 1)} in {self.dt:g} s"
+            reasons[wrong] = f"with such a {name} a law is too steep for {steps}: pass a shorter `dt`"
+        return reasons
 
     def __call__(self, point: Point | None = None) -> dict[str, Scalar]:
         """The metrics by name, with other values of the parameters at these paths."""

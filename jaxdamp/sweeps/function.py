@@ -64,6 +64,15 @@ class HasSideBySide(Protocol):
 
 
 @runtime_checkable
+class HasReach(Protocol):
+    """A function with a form for points all over a range."""
+
+    def reaching(self, columns: Mapping[str, np.ndarray]) -> PointFunction:
+        """The form for points among or between these values of the axes."""
+        ...
+
+
+@runtime_checkable
 class HasPrinted(Protocol):
     """A function whose loop can be printed as C, which is faster."""
 
@@ -86,7 +95,7 @@ class HasDomain(Protocol):
         ...
 
 
-class SweepFunction(HasUnits, HasLanes, HasDerivatives, HasSideBySide, HasPrinted, HasDomain, Protocol):
+class SweepFunction(HasUnits, HasLanes, HasDerivatives, HasSideBySide, HasReach, HasPrinted, HasDomain, Protocol):
     """A function that says all of it, as `jaxdamp.Ride` does."""
 
     def __call__(self, point: dict[str, Scalar]) -> Mapping[str, Array]:

@@ -12,12 +12,13 @@ import jax
 import numpy as np
 
 from jaxdamp._warned import warn
-from jaxdamp.sweeps.axes import AbstractPoints, Points
+from jaxdamp.sweeps.axes import AbstractListed, AbstractPoints, Columns, Points
 from jaxdamp.sweeps.function import (
     Gradients,
     HasDomain,
     HasLanes,
     HasPrinted,
+    HasReach,
     HasSideBySide,
     HasUnits,
     PointFunction,
@@ -30,6 +31,7 @@ from jaxdamp.sweeps.table import Table
 
 CALL = 0.3  # s that one call of the program should take
 LONG = 60.0  # s of work left: compiling another program and comparing takes 4 to 10, and may save a fifth of them
+SPREAD = 4096  # points that show the range of those that are computed when they are needed
 TURNS = 3  # calls of each program before one of them is chosen; the fastest counts, other work only adds time
 
 
@@ -181,7 +183,8 @@ class Computation:
     @functools.cached_property
     def function(self) -> PointFunction:
         """The form of the function that is compiled."""
-        return self.given.side_by_side() if isinstance(self.given, HasSideBySide) else self.given
+        function = self.given.reaching(_spread(self.points)) if isinstance(self.given, HasReach) else self.given
+        return function.side_by_side() if isinstance(function, HasSideBySide) else function
 
     @functools.cached_property
     def traced(self) -> Traced:
@@ -241,6 +244,13 @@ class Computation:
         """By what the loop of the function was compiled at the end."""
         told = isinstance(self.function, HasPrinted) and self.function.is_printed
         return PRINTED if told or runner.program.traced is not self.traced else COMPILED
+
+
+def _spread(points: AbstractPoints) -> Columns:
+    """The values of the axes: all that are listed, or those of some points all over."""
+    if isinstance(points, AbstractListed):
+        return points.values
+    return points.columns(np.unique(np.linspace(0, points.count - 1, SPREAD).astype(int)))
 
 
 def _lanes(function: object) -> int | None:

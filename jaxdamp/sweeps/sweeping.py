@@ -100,9 +100,9 @@ def sweep(
             numbers, or arrays of fixed shape. An equinox module that is called so is compiled once for all values of
             its arrays; arrays that a plain function closes over are compiled in. It may say more of itself
             (`sweeps.SweepFunction`): `units` of results and axes, which label the results; `lanes`, the number of
-            points that are computed side by side on a CPU; `derivatives`, the modes that pass; `side_by_side()`, a form
-            that is compiled in its place; `out_of_domain(columns)`, a text for each of many points, empty for those
-            that can be computed.
+            points that are computed side by side on a CPU; `derivatives`, the modes that pass; `reaching(columns)` and
+            `side_by_side()`, forms that are compiled in its place, for these values of the axes and for many points;
+            `out_of_domain(columns)`, a text for each of many points, empty for those that can be computed.
         over: values for each axis, whose every combination is taken (the last axis runs fastest); or
             `jaxdamp.sweeps.points`, `random` or `sobol`. The function gets them as floating numbers.
         summary: what is kept instead of all results: statistics, and the histograms, best points and Pareto set that a

@@ -15,7 +15,6 @@ from jaxdamp._pieces import piece
 from jaxdamp._settings import part
 from jaxdamp.dampers import RangeUse, has_fitted_range
 from jaxdamp.metrics import Metric, current_name
-from jaxdamp.parameters import FreeParameters
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import (
     DEVIATIONS,
@@ -26,6 +25,7 @@ from jaxdamp.simulation import (
     over_runs,
     range_sentences,
     stationary_notes,
+    steepest,
     substeps_needed,
 )
 from jaxdamp.solve import Evaluation, Region
@@ -64,36 +64,24 @@ def step_notes(start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable
 
 
 def stepped_for_choices(run: Run, space: SearchRange) -> Run:
-    """The run with as many substeps as the steepest of the choices needs, tried one by one, and all ends together.
+    """The run with as many substeps as the steepest of the choices needs.
 
     A search takes the substeps that its start needs, and its steps are small; a choice may be far from there.
     """
     engine = Exponential() if run["engine"] is None else run["engine"]
     if not space.is_choice.any() or not isinstance(engine, Exponential) or engine.substeps is not None:
         return run
+
+    def design(numbers: dict[int, float]) -> AbstractVehicle:
+        values = space.start.copy()
+        values[list(numbers)] = list(numbers.values())
+        return space.free.build(jnp.asarray(values, space.free.values.dtype))
+
+    choices = {i: choice.values for i, choice in enumerate(space.choices) if choice is not None}
     dt = run["dt"] or engine.spacing or USUAL_STEP
-    designs = [space.start]
-    for i, choice in enumerate(space.choices):
-        designs += [_replaced(space.start, {i: value}) for value in (() if choice is None else choice.values)]
-    for end in (0, -1):
-        designs.append(_replaced(space.start, {i: c.values[end] for i, c in enumerate(space.choices) if c is not None}))
-    needs = [_needed(space.free, design, dt) for design in designs]
-    return run if max(needs) == needs[0] else {**run, "engine": dataclasses.replace(engine, substeps=max(needs))}
-
-
-def _replaced(values: np.ndarray, others: Mapping[int, float]) -> np.ndarray:
-    """Some of the numbers replaced."""
-    values = values.copy()
-    values[list(others)] = list(others.values())
-    return values
-
-
-def _needed(free: FreeParameters, values: np.ndarray, dt: float) -> int:
-    """The substeps that a design needs; 1 for what no vehicle can be, or no step can follow."""
-    try:
-        return substeps_needed(free.build(jnp.asarray(values, free.values.dtype)), dt)
-    except ValueError:
-        return 1
+    count = steepest(design, choices, dt)
+    more = count > substeps_needed(design({}), dt)
+    return {**run, "engine": dataclasses.replace(engine, substeps=count)} if more else run
 
 
 def outside_ranges(

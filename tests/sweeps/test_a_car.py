@@ -67,6 +67,24 @@ def test_cars_that_cannot_exist_fail_with_a_reason():
         jaxdamp.sweep(ride, {"rate": [-2.0, -1.0]})
 
 
+def test_the_steepest_end_of_the_axes_sets_the_steps_of_a_sweep():
+    car, road, (name,) = vehicles.presets.quarter_car_000(), roads.step(0.02, start=0.05), ["working_space_rms"]
+    ride, steep = jaxdamp.Ride(car, road, metrics=[name], duration=0.3, dt=2e-3), {"damper.rate": 200e3}
+    with pytest.warns(UserWarning, match="1 of 3 points of the sweep failed.* a law is too steep for 4 steps in 0.002"):
+        data = jaxdamp.sweep(ride, {"damper.rate": [1500.0, 200e3, 1e9]})
+    assert data["failed"].values.tolist() == [False, False, True]
+    alone = jaxdamp.Ride(replace(car, steep), road, metrics=[name], duration=0.3, dt=2e-3)
+    assert alone.substeps == 4 and float(data[name][1]) == pytest.approx(float(alone()[name]), rel=1e-9)
+    rate, mass = np.array([1500.0, 200e3]), np.array([20.0, 60.0])
+    both = [{"damper.rate": rate, "unsprung_mass": mass}, {"unsprung_mass": mass, "damper.rate": rate}]
+    lightest = replace(car, steep | {"unsprung_mass": 20.0})
+    needed = jaxdamp.simulation.substeps_needed(lightest, 2e-3)
+    assert [ride.reaching(columns).substeps for columns in both] == [needed, needed]
+    fixed = jaxdamp.Ride(car, road, metrics=[name], duration=0.3, dt=2e-3, substeps=1)
+    assert fixed.reaching(both[0]) is fixed
+    assert ["too steep" in reason for reason in fixed.out_of_domain({"damper.rate": rate})] == [False, True]
+
+
 def test_a_ride_takes_one_number_for_each_parameter():
     ride = jaxdamp.Ride(vehicles.presets.quarter_car_000(), roads.step(0.02, start=0.05), duration=0.1)
     with pytest.raises(ValueError, match=r"point\['rate'\]` must be one number for one car, .*`jaxdamp\.sweep"):
