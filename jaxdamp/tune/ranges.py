@@ -35,6 +35,7 @@ DAMPERS = ("**damper.**",)  # what is tuned by default, as far as it is adjustab
 MOST_COMBINATIONS = 2000  # of choices, up to which all are driven if nothing else is free
 MOST_CHOICES = 6  # numbers of which otherwise all combinations of two neighbours are tried
 NO_BOUND = (-math.inf, math.inf)
+MOST_NAMED = 2  # numbers without a range that are named
 _ROUNDING = 1e-12  # of its unit, below which the end of a parameter is zero
 
 
@@ -99,7 +100,7 @@ class SearchRange:
     unit: np.ndarray  # the value of each number where its coordinate is one
     lower: np.ndarray  # the smallest allowed value of each number
     upper: np.ndarray  # the largest allowed value of each number
-    origin: tuple[tuple[str, str], ...]  # of the two bounds of each number: "default", "given" or "domain"
+    origin: tuple[tuple[str, str], ...]  # of both bounds of each number: "default", "given", "domain" or "zero"
     choices: tuple[Choice | None, ...]  # the values allowed at the end; None for all between the bounds
     undetermined: tuple[str, ...] = ()  # the parameters left alone because no record determined them
 
@@ -123,6 +124,16 @@ class SearchRange:
         slack = np.where(self.is_choice | self.is_held, -np.inf, 2 * INSIDE * self.unit)
         low, high = values <= self.lower + slack, values >= self.upper - slack
         return ["lower" if at_low else "upper" if at_high else "" for at_low, at_high in zip(low, high, strict=True)]
+
+    def notes_without_range(self, changes: Sequence[Change]) -> list[str]:
+        """A sentence on numbers that left zero, to which no bound is in proportion; nothing without any."""
+        left = [c for c, origin in zip(changes, self.origin, strict=True) if "zero" in origin and c.after != c.before]
+        if not left:
+            return []
+        ends = [f"{c.name} ended at {c.after:.4g} {c.unit}".rstrip() for c in left[:MOST_NAMED]]
+        more = f" and {len(left) - MOST_NAMED} more" * (len(left) > MOST_NAMED)
+        bounds = f"`bounds={{{left[0].name.partition('[')[0]!r}: (lower, upper)}}`"
+        return [f"{', '.join(ends)}{more}: zero, where a search starts, gives no range in proportion. Pass {bounds}."]
 
     def changes(self, values: np.ndarray) -> tuple[Change, ...]:
         """Every free number before and after, with its bounds."""
@@ -275,7 +286,9 @@ def _one_range(
     source = "default" if given is None else "given"
     inside = 0.0 if p.command else INSIDE * unit
     edges = p.domain.lower + inside, p.domain.upper - inside
-    where = source if low > edges[0] else "domain", source if high < edges[1] else "domain"
+    end = "zero" if given is None and value == 0.0 and p.domain != weight and not p.command else "domain"
+    ends = [end if math.isinf(edge) else "domain" for edge in edges]
+    where = source if low > edges[0] else ends[0], source if high < edges[1] else ends[1]
     return min(max(low, edges[0]), value), max(min(high, edges[1]), value), where
 
 

@@ -205,7 +205,7 @@ def bound_notes(space: SearchRange, changes: tuple[Change, ...]) -> list[str]:
     for change, origin in zip(changes, space.origin, strict=True):
         if change.note:
             groups.setdefault(origin["upper" in change.note], []).append(change)
-    notes = []
+    notes = space.notes_without_range(changes)
     for origin, group in groups.items():
         ends = [f"{c.name} ended {c.note}, {c.after:.5g} {c.unit}".rstrip() for c in group]
         if len(group) > MOST_NAMED:

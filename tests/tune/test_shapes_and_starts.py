@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from jaxdamp import Ride, dampers, metrics, parameters, roads, tune, vehicles
+from jaxdamp.control import Controlled, Skyhook
 from jaxdamp.metrics import Metric
 from jaxdamp.tune import smooth as smooth_metrics
 from jaxdamp.tune.ranges import search_range, start_points
 from jaxdamp.tune.shape import held_force
+from jaxdamp.tune.verdict import bound_notes
 
 
 def exact_counterpart(metric: Metric) -> Any:
@@ -75,6 +77,18 @@ def test_several_starts_find_the_same_optimum_as_one() -> None:
     assert len(result.starts) == 3 and all(attempt.converged for attempt in result.starts)
     assert not result.warnings and [step for step, _ in seen] == list(range(1, len(seen) + 1))
     assert min(value for _, value in seen) == pytest.approx(result.after["rms_sprung_acceleration"])
+
+
+def test_numbers_that_left_zero_are_said_to_have_had_no_range() -> None:
+    law = dampers.Scheduled((dampers.Linear(300.0), dampers.Linear(4000.0)), levels=[0.0, 1.0], command=0.3)
+    car = Controlled(vehicles.presets.quarter_car_000(law), Skyhook(1500.0))
+    space = search_range(car, ["policy.**"], [], None)
+    (note,) = bound_notes(space, space.changes(np.array([1500.0, 254.0])))
+    assert note.startswith("policy.lead ended at 254 s: zero, where a search starts, gives no range in proportion.")
+    assert note.endswith("Pass `bounds={'policy.lead': (lower, upper)}`.")
+    assert not space.notes_without_range(space.changes(space.start))
+    bounded = search_range(car, ["policy.**"], [], {"policy.lead": (0.0, 0.1)})
+    assert not bound_notes(bounded, bounded.changes(np.array([1500.0, 0.05])))
 
 
 def test_starts_lie_inside_the_bounds_and_in_order() -> None:
