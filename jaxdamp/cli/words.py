@@ -149,11 +149,11 @@ _QUANTITY = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-zÂ
 def quantity(text: str) -> tuple[float, str] | None:
     """The number and the unit of a text; None where it has no unit.
 
-    >>> quantity("500 lbf"), quantity("1e3"), quantity("+10%")
-    ((500.0, 'lbf'), None, None)
+    >>> quantity("500 lbf"), quantity("1e3"), quantity("2e-3"), quantity("+10%")
+    ((500.0, 'lbf'), None, None, None)
     """
     match = _QUANTITY.fullmatch(text)
-    if match is None or re.fullmatch(r"[eE]\d+", match[2]):  # 1e3 is a number
+    if match is None or re.fullmatch(r"[eE][+-]?\d+", match[2]):  # 1e3 is a number
         return None
     return float(match[1]), match[2]
 
