@@ -2,8 +2,9 @@
 
 import dataclasses
 import itertools
+import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import Unpack
+from typing import NamedTuple, Unpack
 
 import jax.numpy as jnp
 import numpy as np
@@ -14,13 +15,15 @@ from jaxdamp._settings import with_defaults
 from jaxdamp._status import Status
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, MetricValues
+from jaxdamp.simulation import AbstractEngine, CoarseStepWarning, Exponential
 from jaxdamp.solve import Evaluation
 from jaxdamp.tune.combinations import Combinations, beside_next
-from jaxdamp.tune.descending import Descent, Driven, Ended, every_combination, missed, rank, reached, walls_of
-from jaxdamp.tune.limits import Limit, LimitEnd, LimitRange, decided, end_moved, in_each, limit_ends, lost_limits
+from jaxdamp.tune.descending import Descent, Driven, Ended, every_combination, missed, rank, reached
+from jaxdamp.tune.limits import Limit, LimitRange, decided, in_each, lost_limits
 from jaxdamp.tune.measuring import ride_on
 from jaxdamp.tune.objective import Function, check_objective
 from jaxdamp.tune.ranges import start_points
+from jaxdamp.tune.relaxation import relaxation
 from jaxdamp.tune.rescoring import Rescore, other_roads, rescored
 from jaxdamp.tune.result import Attempt, Drive, ScenarioValues, TuneResult, V
 from jaxdamp.tune.scenario_ride import ScenarioRide
@@ -44,9 +47,6 @@ from jaxdamp.tune.verdict import (
 from jaxdamp.vehicles import AbstractVehicle
 
 
-OUTWARDS = 1e-3  # of what the search reached, by which a relaxed limit is beyond it
-SHARE = 0.01  # of the metric: the gain for which a relaxation is said
-FAR = 0.1  # of a limit, up to which its price at the optimum is taken to hold
 FEWEST = 4  # fresh roads before their interval is looked at; then twice as many, and so on
 TIGHTENED = 2  # times that a search is repeated with limits that did not hold on fresh roads
 
@@ -119,16 +119,14 @@ def minimise(
     check_call("minimise(metric, vehicle, road)", vehicle, road, settings)
     task = DesignTask([metric], vehicle, road, argument="metric", settings=settings)
     fresh_roads, name = settings["fresh_roads"], task.objective.name
-    evaluator = Evaluator(task, settings["starts"])
-    starts = start_points(task.space, settings["starts"], settings["seed"]) / task.space.unit
-    evaluations, limits = evaluator.begin(starts)
     with Progress("Tuning") as shown:
         progress = progress or (lambda step, value: shown(f"step {step}, {name} {value:.5g}"))
-        combining = every_combination(evaluator, progress)
-        evaluator.refuse_constant(evaluations[0], [one.evaluation for one in combining.ends] if combining else ())
-        descent = combining or Descent(evaluator, settings["max_steps"], progress)
-        several = descent.search(starts, evaluations, limits)
-        ended, tighter = _best(descent, several, limits), limits
+        searched = _searched(task, settings, progress)
+        while engine := _finer(task, searched.best.values, settings["engine"]):  # by fewer substeps than it needs
+            task = DesignTask([metric], vehicle, road, argument="metric", settings={**settings, "engine": engine})
+            searched = _searched(task, settings, progress)
+        evaluator, descent, starts, evaluations, limits, several, ended = searched
+        tighter = limits
         allowed = in_each(task.allowed, task.measured.scenario_names)
         fresh = _on_fresh_roads(evaluator, (task.space.start, ended.values), range(fresh_roads), allowed)
         for again in range(1, TIGHTENED + 1):
@@ -145,8 +143,51 @@ def minimise(
             fresh = _on_fresh_roads(evaluator, (task.space.start, ended.values), others, allowed)
         attempts = _attempts(task, starts, several, limits) if len(several) > 1 else ()
         result = _result(task, evaluations[0], ended, attempts, (limits, tighter), fresh, settings)
-    combinations = None if combining is None else _beside_next(evaluator, combining.combinations(tighter), fresh_roads)
+    driven = descent.combinations(tighter) if isinstance(descent, Driven) else None
+    combinations = None if driven is None else _beside_next(evaluator, driven, fresh_roads)
     return dataclasses.replace(result, combinations=combinations)
+
+
+class _Searched(NamedTuple):
+    """Searches from the starts, with what they began from."""
+
+    evaluator: Evaluator
+    descent: Descent | Driven
+    starts: np.ndarray  # coordinates
+    evaluations: list[Evaluation]
+    limits: list[Limit]
+    several: Sequence[Ended]
+    best: Ended
+
+
+def _searched(
+    task: DesignTask[AbstractVehicle], settings: Settings, progress: Callable[[int, float], None]
+) -> _Searched:
+    """The searches of a task; every combination where all that is free is a choice."""
+    evaluator = Evaluator(task, settings["starts"])
+    starts = start_points(task.space, settings["starts"], settings["seed"]) / task.space.unit
+    evaluations, limits = evaluator.begin(starts)
+    combining = every_combination(evaluator, progress)
+    evaluator.refuse_constant(evaluations[0], [one.evaluation for one in combining.ends] if combining else ())
+    descent = combining or Descent(evaluator, settings["max_steps"], progress)
+    several = descent.search(starts, evaluations, limits)
+    return _Searched(evaluator, descent, starts, evaluations, limits, several, _best(descent, several, limits))
+
+
+def _finer(task: DesignTask[AbstractVehicle], values: np.ndarray, asked: AbstractEngine | None) -> Exponential | None:
+    """The engine with the substeps that a design needs, if the search took fewer and nobody asked for so many."""
+    engine = Exponential() if asked is None else asked
+    if is_white(task.road) or not isinstance(engine, Exponential) or engine.substeps is not None:
+        return None
+    design = task.space.free.build(jnp.asarray(values, task.space.free.values.dtype))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", CoarseStepWarning)  # of the result
+        try:
+            rides = task.measured.ride, ride_on(design, task.road, task.objective, {**task.run, "engine": asked})
+        except ValueError:  # no step can follow it, as a note on the result says
+            return None
+    taken, needs = (ride.ride.substeps if isinstance(ride, ScenarioRide) else ride.substeps for ride in rides)
+    return dataclasses.replace(engine, substeps=needs) if needs > taken else None
 
 
 def _beside_next(evaluator: Evaluator, combinations: Combinations, fresh_roads: int) -> Combinations:
@@ -253,7 +294,7 @@ def _result(
             fresh_roads=asked["fresh_roads"],
             scenarios=task.road.in_words if isinstance(task.road, Scenarios) else "",
         ),
-        relaxation=_relaxation(task, ended, limits),
+        relaxation=relaxation(task, ended, limits),
         tightened=tightened,
     )
 
@@ -293,54 +334,3 @@ def _in_scenarios(task: DesignTask[AbstractVehicle], tuned: AbstractVehicle) -> 
         return None
     sides = [{n: np.asarray(x, float) for n, x in measured.each(car).items()} for car in (task.vehicle, tuned)]
     return ScenarioValues(measured.scenario_names, *sides)
-
-
-def _relaxation(task: DesignTask[V], ended: Ended, limits: tuple[Sequence[Limit], Sequence[Limit]]) -> str:
-    """Which limit, relaxed by how much, would give a tuning within the limits, or one that is 1 % better, in words.
-
-    Where limits are not met: as far as the search came. At an optimum f within the limits, the Lagrange multiplier λ of
-    a limit that holds it is its price −df/d(limit), and it must be relaxed by about 0.01 |f|/λ: said is the limit for
-    which this is the smallest share of its scale, if it is near. All places or scenarios are relaxed alike.
-    """
-    ends, of = limit_ends(limits[0]), {limit.name: limit for limit in limits[0]}
-    rows = ended.evaluation.rows[len(task.followed) :]
-    over = [(row - end.sign * end.value) / end.scale for end, row in zip(ends, rows, strict=True)]
-    worst = {of[ends[i].name].of: i for i in np.argsort(over) if over[i] > task.tolerance.limit}
-    if worst:
-        return _within_reach([(of[ends[i].name], ends[i], float(rows[i])) for i in worst.values()])
-    prices: dict[tuple[str, float], list[tuple[float, int]]] = {}
-    for i, price in _prices(task, ended, limit_ends(limits[1])).items():
-        limit, end = of[ends[i].name], ends[i]
-        if not limit.is_shape:
-            prices.setdefault((limit.of, end.sign), []).append((price * end.scale, i))
-    totals = {limit: sum(price for price, _ in own) for limit, own in prices.items()}
-    if not totals:
-        return ""
-    dearest = max(totals, key=totals.__getitem__)
-    end = ends[max(prices[dearest])[1]]
-    by = end.scale * SHARE * abs(task.metric(ended.evaluation)) / totals[dearest]
-    if by > FAR * abs(end.value):  # where there may be no such optimum
-        return ""
-    to = end.value + end.sign * by
-    alike = ", and all others of this limit alike" * (len({e.name for e in ends if of[e.name].of == dearest[0]}) > 1)
-    return f"Cheapest for 1 % less {task.objective.name}: {end_moved(of[end.name], end, to)}{alike}."
-
-
-def _within_reach(reached: Sequence[tuple[Limit, LimitEnd, float]]) -> str:
-    """The limits as far as the search came, by the rows that it reached."""
-    ends = [(limit, end, end.sign * row) for limit, end, row in reached]
-    moved = [end_moved(limit, end, to + end.sign * OUTWARDS * abs(to)) for limit, end, to in ends]
-    return f"Within reach: {' and '.join(moved)}."
-
-
-def _prices(task: DesignTask[V], ended: Ended, ends: Sequence[LimitEnd]) -> dict[int, float]:
-    """−df/d(limit) of each end of a limit that holds an optimum, by its number."""
-    count, rows = len(task.followed), ended.evaluation.rows
-    least, free = task.tolerance.limit, np.array([not side for side in task.space.side(ended.values)])
-    free &= ~(task.space.is_choice | task.space.is_held)
-    tight = [i for i, end in enumerate(ends) if abs(rows[count + i] - end.sign * end.value) < least * end.scale]
-    if not (tight and free.any() and ended.slope_left() < task.tolerance.slope):
-        return {}
-    slope, walls = walls_of(task, ended.evaluation, tight)
-    multipliers = -np.linalg.lstsq(walls[:, free].T, slope[free], rcond=None)[0][: len(tight)]
-    return {i: float(price) for i, price in zip(tight, multipliers, strict=True) if price > 0.0}

@@ -68,6 +68,17 @@ def test_a_choice_that_needs_more_steps_than_the_start_is_driven_with_them() -> 
     assert alone.substeps > 1 and result.after[travel] == pytest.approx(float(alone()[travel]), rel=1e-9)
 
 
+def test_a_tuned_vehicle_is_driven_with_the_substeps_that_it_needs() -> None:
+    """Its numbers, and those before, were by the one step of the start, and the advice was to tune again."""
+    road, run = roads.cosine_bump(0.05, start=0.1, duration=0.25), tune.Run(duration=0.5, dt=5e-3)
+    result = tune.minimise("travel", CAR, road, over={"damper.rate": (1000.0, 40000.0)}, **run)
+    alone, travel = Ride(result.vehicle, road, **run), result.metric
+    assert alone.substeps > Ride(CAR, road, **run).substeps and not any("tune again" in w for w in result.warnings)
+    assert result.after[travel] == pytest.approx(float(alone()[travel]), rel=1e-6)
+    before = Ride(CAR, road, substeps=alone.substeps, **run)
+    assert result.before[travel] == pytest.approx(float(before()[travel]), rel=1e-6)
+
+
 def test_clicks_are_chosen_and_swept() -> None:
     """A valley between two hills: every click is driven, where a descent would end at the nearer hill."""
     rates = [900.0, 2500.0, 1200.0, 300.0, 7000.0, 3500.0]
