@@ -40,7 +40,6 @@ from jaxdamp.tune.verdict import (
     tightened_notes,
     true_value_notes,
     violations,
-    where_it_holds,
     without_effect,
     workshop_notes,
 )
@@ -289,11 +288,7 @@ def _result(
         violated=violations(short, after),
         extrapolated=tuple(extrapolated),
         allowed=task.allowed,
-        elsewhere=where_it_holds(
-            white=is_white(task.road),
-            fresh_roads=asked["fresh_roads"],
-            scenarios=task.road.in_words if isinstance(task.road, Scenarios) else "",
-        ),
+        elsewhere=_where_it_holds(task.road, asked["fresh_roads"]),
         relaxation=relaxation(task, ended, limits),
         tightened=tightened,
     )
@@ -325,6 +320,13 @@ def _on_fresh_roads(
         if decided(driven, allowed):
             break
     return driven
+
+
+def _where_it_holds(road: Road | Scenarios, fresh_roads: int) -> str:
+    """Where the numbers of a tuning hold that was not tried on fresh roads, in words."""
+    if is_white(road):
+        return (road.in_words if isinstance(road, Scenarios) else "") or "in the mean of all such roads"
+    return "on the road of the tuning" + (", which cannot be drawn again" if fresh_roads else ", tried on no other")
 
 
 def _in_scenarios(task: DesignTask[AbstractVehicle], tuned: AbstractVehicle) -> ScenarioValues | None:

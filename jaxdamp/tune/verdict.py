@@ -222,13 +222,6 @@ def bound_notes(space: SearchRange, changes: tuple[Change, ...]) -> list[str]:
     return notes
 
 
-def where_it_holds(*, white: bool, fresh_roads: int, scenarios: str) -> str:
-    """Where the numbers of a tuning hold that was not tried on fresh roads, in words."""
-    if white:
-        return scenarios or "in the mean of all such roads"
-    return "on the road of the tuning" + (", which cannot be drawn again" if fresh_roads else ", tried on no other")
-
-
 def early_end(ended: "Ended", max_steps: int) -> str:
     """Why a search that satisfied all limits did not converge."""
     slope = f"the remaining slope is {ended.slope_left():.1e} of the metric per 100 % of the parameters"
