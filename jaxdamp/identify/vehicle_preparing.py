@@ -30,6 +30,7 @@ FIRST_GUESS = 0.1  # noise of a channel at first, relative to its standard devia
 MEDIAN = 1.4826  # standard deviation of normal noise, relative to the median of its magnitude
 LEAST_NOISE = 1e-4  # the same at the end, so that records without noise can be fitted
 UNSEEN = 1e-6  # change of the channels when the scale is doubled, relative to them, that counts as none
+UNSEEN_SINGLE = 1e-4  # the same in single precision
 FAR = 1e3  # times a limited number, to which it may go away from its limit
 INWARD = 0.1  # of the way from its limit back to the start, where the search begins anew
 BISECTIONS = 10  # of the range in which a number stops to be accepted
@@ -279,7 +280,8 @@ def free_scale(problem: Problem, point: SearchEnd) -> FreeScale:
     free = problem.free
     powers = force_powers(free)
     change = float(np.linalg.norm(point.jacobian @ (powers * point.values)))
-    if not np.any(powers) or not change < UNSEEN * problem.level:
+    unseen = UNSEEN if free.values.dtype == np.float64 else UNSEEN_SINGLE
+    if not np.any(powers) or not change < unseen * problem.level:
         return FreeScale()
     single = [i for i, p in enumerate(free.owners) if powers[i] and p.value.ndim == 0]
     masses = [i for i in single if free.owners[i].unit == "kg"]
