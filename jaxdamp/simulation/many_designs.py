@@ -41,7 +41,9 @@ def steepest_between(vehicle: AbstractVehicle, columns: Mapping[str, np.ndarray]
     return steepest(lambda point: replace(vehicle, point), ends, dt)
 
 
-def can_follow(vehicle: AbstractVehicle, name: str, column: np.ndarray, dt: float, steps: float = np.inf) -> np.ndarray:
+def can_follow(
+    vehicle: AbstractVehicle, name: str, column: np.ndarray, dt: float, steps: float | int = np.inf
+) -> np.ndarray:
     """For which values of one parameter a vehicle is stable with so many substeps, or as many as an engine takes.
 
     From the vehicle's own value on a parameter only gets steeper in each direction, or less steep.
