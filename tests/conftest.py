@@ -25,7 +25,7 @@ os.environ.pop("COLUMNS", None)  # of pytest-xdist: commands are as wide as wher
 
 
 MAPS = Path("/proc/self/maps")
-MOST_MAPS = 55_000  # Linux allows a process 65 530; a program takes 5 to 20, a file of tests up to 4000, slow ones up to 10 000
+MOST_MAPS = 55_000  # Linux allows a process 65 530; a program takes 5 to 20, a file of slow tests up to 10 000
 MOST_KEPT = 2_000_000_000  # bytes of compiled programs in .pytest_cache
 
 # Programs that a plain test may have compiled: one that needs more computes number by number with `jnp`, each operation
