@@ -14,7 +14,6 @@ from jaxdamp.solve.step_models import StepModels
 RADIUS = 0.5  # largest change of a coordinate in the first step; coordinates are one at the start
 LEAST_RADIUS = 1e-6
 CURVATURE = 0.1  # second derivative of a row by a coordinate at first, relative to its size
-SHARE = 1e-4  # of the sum of several objectives in each problem: excludes points that others beat in one objective
 PLANES = 4  # refused points whose tangents take part
 FAR_WORSE = -10.0  # loss in units of the promised gain, from which slopes at a point say nothing of those near by
 PENALTY, FURTHER, HIGHEST = 10.0, 10.0, 1e9  # of a violated limit, in units of the objectives: first, factor, highest
@@ -148,7 +147,7 @@ class SequentialQuadratic:
         improvement: of the scaled objectives, that a search may leave at its end.
         rounding: error of the scaled objectives.
         feasible: violation of a scaled limit up to which the penalty does not grow; infinite for a constant penalty.
-        share: of the sum of several objectives in what is minimised beside the largest excess.
+        share: of the sum of all objectives in what is minimised; a small one excludes points that others beat in one.
 
     Source: Nocedal, Wright, Numerical Optimization, 2nd edition, sections 18.5 (trust region, exact penalty) and 17.2.
     """
@@ -159,7 +158,7 @@ class SequentialQuadratic:
     improvement: float
     rounding: float = 1e-13
     feasible: float = np.inf
-    share: float = SHARE
+    share: float = 0.0
 
     def init(
         self, aim: Float[np.ndarray, " objectives"], y: Float[np.ndarray, " free"], evaluation: Evaluation
@@ -232,11 +231,7 @@ class SequentialQuadratic:
             penalty: of violated limits.
         """
         objectives, limits = np.split(self.scaling.of(rows), [self.scaling.objectives])
-        return float((objectives - aim).max() + self._share * objectives.sum() + penalty * limits.max(initial=0.0))
-
-    @property
-    def _share(self) -> float:
-        return self.share if self.scaling.objectives > 1 else 0.0
+        return float((objectives - aim).max() + self.share * objectives.sum() + penalty * limits.max(initial=0.0))
 
     def _move(self, state: SearchState, y: np.ndarray, evaluation: Evaluation, promised: float) -> None:
         """Go to a tried point if it is better, and adapt the trust region."""
@@ -293,10 +288,10 @@ class SequentialQuadratic:
             planes / at_planes,
             plane_slopes / at_planes[:, None],
             count,
-            self._share,
+            self.share,
             state.penalty * of_limits / size,
         )
-        models = models if self._share else models.of_largest(box)
+        models = models if self.share else models.of_largest(box)
         step, promised = models.best_step(lower, upper, region.matrix, region.least - region.matrix @ state.y)
         return step, size * promised
 

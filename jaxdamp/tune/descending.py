@@ -108,7 +108,6 @@ class Descent:
             improvement=0.1 * tolerance.rounding,
             rounding=tolerance.rounding,
             feasible=0.1 * tolerance.limit,
-            share=0.0,
         )
 
     def _ended_early(self, state: SearchState, scaling: Scaling) -> bool:
@@ -210,19 +209,43 @@ def missed(limits: Sequence[Limit], values: Mapping[str, float], tolerance: Tole
     return [limit for limit in limits if not limit.margin(values[limit.name]) >= -tolerance.limit]
 
 
-def walls_of(
-    task: DesignTask[AbstractVehicle], evaluation: Evaluation, tight: np.ndarray | Sequence[int]
-) -> tuple[np.ndarray, np.ndarray]:
-    """The slopes of the metric, and of what holds it: limits that are reached, other scenarios that are as bad."""
+def balanced(
+    gradients: Float[np.ndarray, "gradients free"], walls: Float[np.ndarray, "walls free"]
+) -> tuple[float, Float[np.ndarray, " walls"]]:
+    """Length of the shortest sum of a mean of gradients and of multiples of walls, and these multiples.
+
+    No weight is negative. It is zero where no direction decreases all functions with these gradients, but beyond the
+    walls, whose functions must not increase (Karush, Kuhn, Tucker); the multiples are their Lagrange multipliers.
+    """
+    import scipy.optimize
+
+    heavy = 1e3 * np.linalg.norm(gradients, axis=1).max(initial=0.0)  # weights of gradients add up to one
+    if not heavy > 0.0:
+        return heavy, np.zeros(len(walls))
+    lengths = np.linalg.norm(walls, axis=1)
+    lengths = np.where(lengths > 0.0, lengths, 1.0)
+    rows = np.concatenate([gradients, walls / lengths[:, None]])
+    sums = np.repeat([heavy, 0.0], [len(gradients), len(walls)])
+    target = np.append(np.zeros(rows.shape[1]), heavy)
+    weights, _ = scipy.optimize.nnls(np.append(rows.T, sums[None], axis=0), target)
+    return float(np.linalg.norm(weights @ rows)), weights[len(gradients) :] / lengths
+
+
+def held_by(
+    task: DesignTask[AbstractVehicle], evaluation: Evaluation, tight: np.ndarray | Sequence[int], moved: np.ndarray
+) -> tuple[float, np.ndarray]:
+    """The slope of the metric that is left over the coordinates that move, and the multiplier of each tight limit.
+
+    Of the worst case the slopes of all scenarios that are as bad count.
+    """
     count, metric = len(task.followed), task.metric(evaluation)
-    rows, slopes = evaluation.rows[:count], evaluation.slopes
-    alike = np.flatnonzero(rows >= metric - task.tolerance.limit * abs(metric))
-    first, *others = slopes[alike]
-    return first, np.concatenate([slopes[count:][tight], *((other - first)[None] for other in others)])
+    alike = evaluation.rows[:count] >= metric - task.tolerance.limit * abs(metric)
+    slopes = evaluation.slopes[:, moved]
+    return balanced(slopes[:count][alike], slopes[count:][tight])
 
 
 def _slope_left(evaluator: Evaluator, state: SearchState, scaling: Scaling) -> float:
-    """Length of the scaled gradient after projection on bounds and active limits, relative to the metric.
+    """Length of the scaled gradient that bounds and active limits do not balance, relative to the metric.
 
     Zero where a search ended by itself at a metric of zero, such as a distance from targets that are met.
     """
@@ -231,11 +254,8 @@ def _slope_left(evaluator: Evaluator, state: SearchState, scaling: Scaling) -> f
         return 0.0
     unbound = np.array([not side for side in task.space.side(state.y * task.space.unit)])
     unbound &= True if state.fixed is None else ~state.fixed
-    gradient, walls = walls_of(task, state.evaluation, _tight(evaluator, rows, scaling))
-    gradient, walls = gradient[unbound], walls[:, unbound].T
-    if walls.size and gradient.size:
-        gradient = gradient - walls @ np.linalg.lstsq(walls, gradient, rcond=None)[0]
-    return float(np.linalg.norm(gradient)) / max(abs(task.metric(state.evaluation)), 1e-300)
+    left, _ = held_by(task, state.evaluation, _tight(evaluator, rows, scaling), unbound)
+    return left / max(abs(task.metric(state.evaluation)), 1e-300)
 
 
 def _tight(evaluator: Evaluator, rows: np.ndarray, scaling: Scaling) -> np.ndarray:
@@ -253,8 +273,6 @@ def _slope_left_at_kink(evaluator: Evaluator, state: SearchState, scaling: Scali
     Source: Burke, Lewis, Overton, A robust gradient sampling algorithm for nonsmooth, nonconvex optimization, SIAM J.
     Optim. 15 (2005).
     """
-    import scipy.optimize
-
     space, free, region = evaluator.task.space, len(state.y), evaluator.region
     size, count = max(abs(evaluator.task.metric(state.evaluation)), 1e-300), scaling.objectives
     near = state.y + NEAR * np.random.default_rng(0).uniform(-1.0, 1.0, (4 * free + 4, free))
@@ -266,8 +284,4 @@ def _slope_left_at_kink(evaluator: Evaluator, state: SearchState, scaling: Scali
     sides = {"lower": -1.0, "upper": 1.0}
     at_bounds = space.side(state.y * space.unit)
     walls += [sides[side] * row for side, row in zip(at_bounds, np.eye(free), strict=True) if side]
-    walls = [wall / length for wall in walls if (length := np.linalg.norm(wall)) > 0.0]
-    heavy = 1e3 * max(float(np.linalg.norm(gradient)) for gradient in gradients)  # weights add up to one
-    columns = [np.append(gradient, heavy) for gradient in gradients] + [np.append(wall, 0.0) for wall in walls]
-    weights, _ = scipy.optimize.nnls(np.stack(columns, axis=1), np.append(np.zeros(free), heavy))
-    return float(np.linalg.norm(np.stack(columns, axis=1)[:-1] @ weights))
+    return balanced(np.stack(gradients), np.reshape(walls, (-1, free)))[0]

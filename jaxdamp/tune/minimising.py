@@ -324,9 +324,11 @@ def _on_fresh_roads(
 
 def _where_it_holds(road: Road | Scenarios, fresh_roads: int) -> str:
     """Where the numbers of a tuning hold that was not tried on fresh roads, in words."""
+    scenarios = road.in_words if isinstance(road, Scenarios) else ""
     if is_white(road):
-        return (road.in_words if isinstance(road, Scenarios) else "") or "in the mean of all such roads"
-    return "on the road of the tuning" + (", which cannot be drawn again" if fresh_roads else ", tried on no other")
+        return scenarios or "in the mean of all such roads"
+    others = "which cannot be drawn again" if fresh_roads else "tried on no other"
+    return f"{scenarios or 'on the road of the tuning'}, {others}"
 
 
 def _in_scenarios(task: DesignTask[AbstractVehicle], tuned: AbstractVehicle) -> ScenarioValues | None:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from jaxdamp.tune.descending import Ended, walls_of
+from jaxdamp.tune.descending import Ended, held_by
 from jaxdamp.tune.limits import Limit, LimitEnd, end_moved, limit_ends
 from jaxdamp.tune.task import DesignTask
 from jaxdamp.vehicles import AbstractVehicle
@@ -61,6 +61,5 @@ def _prices(task: DesignTask[AbstractVehicle], ended: Ended, ends: Sequence[Limi
     tight = [i for i, end in enumerate(ends) if abs(rows[count + i] - end.sign * end.value) < least * end.scale]
     if not (tight and free.any() and ended.slope_left() < task.tolerance.slope):
         return {}
-    slope, walls = walls_of(task, ended.evaluation, tight)
-    multipliers = -np.linalg.lstsq(walls[:, free].T, slope[free], rcond=None)[0][: len(tight)]
+    _, multipliers = held_by(task, ended.evaluation, tight, free)
     return {i: float(price) for i, price in zip(tight, multipliers, strict=True) if price > 0.0}

@@ -136,6 +136,10 @@ class ScenarioRide(eqx.Module):
         """The same: it drives many cars at a time in any case."""
         return self
 
+    def reaching(self, columns: Mapping[str, np.ndarray]) -> "ScenarioRide":
+        """The same with as many substeps as the steepest of these values need, if they were not asked for."""
+        return eqx.tree_at(lambda scenarios: scenarios.ride, self, self.ride.reaching(columns))
+
     def of_vehicle(self, vehicle: AbstractVehicle) -> "ScenarioRide":
         """The same scenarios for another vehicle."""
         return eqx.tree_at(lambda scenarios: scenarios.ride, self, self.ride.of_vehicle(vehicle))

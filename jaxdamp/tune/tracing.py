@@ -21,6 +21,7 @@ FAR = 1e9  # aim of an objective that does not count, in units of its start
 NO_CONFLICT = 1e-4  # range of an objective between the ends, relative to its size, below which there is no front
 SCANNED = 128  # designs all over the bounds, simulated where peaks make many minima
 ELSEWHERE = 0.3  # least distance of another start, relative to the coordinate of the start
+SHARE = 1e-4  # of the sum of the objectives: excludes points that others beat in one of them
 ROUNDS = 3  # of comparing each search with the results of the others
 
 
@@ -53,7 +54,7 @@ class FrontProblem(NamedTuple):
         zeros = [end.sign * end.value - inside * end.scale for end in ends]
         scales = [end.scale * float(min(unit / self.size)) for end in ends]
         scaling = Scaling(np.append(zero, zeros), np.append(unit, scales), self.objectives)
-        return SequentialQuadratic(self.evaluator.region, scaling, self.max_steps, self.improvement)
+        return SequentialQuadratic(self.evaluator.region, scaling, self.max_steps, self.improvement, share=SHARE)
 
     def solver_between(self, states: Sequence[SearchState]) -> SequentialQuadratic:
         """That for objectives from 0 at their best to 1 at their worst value among the ends of the front."""

@@ -116,7 +116,7 @@ def test_aims_spread_along_a_front() -> None:
         return [(x**2 + y**2, [2.0 * x, 2.0 * y]), ((x - 1.0) ** 2 + y**2, [2.0 * (x - 1.0), 2.0 * y])]
 
     aims = [np.array([0.0, 0.0]), np.array([0.0, 0.2])]
-    states = solved(both, np.array([[0.3, 2.0]] * 2), Scaling(np.zeros(2), np.ones(2), 2), aims=aims)
+    states = solved(both, np.array([[0.3, 2.0]] * 2), Scaling(np.zeros(2), np.ones(2), 2), aims=aims, share=1e-4)
     # x² − a₁ = (1 − x)² − a₂, up to the small share of the sum
     np.testing.assert_allclose([state.y for state in states], [[0.5, 0.0], [0.4, 0.0]], atol=1e-3)
 
@@ -130,7 +130,7 @@ def test_the_largest_of_many_is_smallest_where_several_are_equal() -> None:
     def distances(*at):
         return [(float(np.sum((at - point) ** 2)), 2.0 * (at - point)) for point in points]
 
-    (state,) = solved(distances, np.array([[-4.0, 4.0]]), Scaling(np.zeros(63), np.ones(63), 63), share=0.0)
+    (state,) = solved(distances, np.array([[-4.0, 4.0]]), Scaling(np.zeros(63), np.ones(63), 63))
     np.testing.assert_allclose(state.y, centre, atol=1e-6)
     assert state.converged and state.steps < 20
     np.testing.assert_allclose(state.evaluation.rows[:3], 9.0, rtol=1e-6)

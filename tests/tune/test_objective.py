@@ -97,3 +97,13 @@ def test_what_is_no_objective_is_refused():
         tune.minimise(COMFORT, CAR, BUMP, metrics=["lift_off_fraction"], duration=0.4)
     with pytest.raises(ValueError, match=r"`metric` must be one of .*'rms_sprung_acceleration'"):
         tune.minimise(Metric("stroke", metrics.percentile(95)), CAR, WHITE)
+
+
+def test_a_parameter_that_meets_a_limit_is_not_without_effect():
+    """The largest acceleration on a bump comes from compression, the extension behind it from rebound."""
+    car = vehicles.presets.quarter_car_000(dampers.Bilinear(2500.0, 2500.0))
+    kick = Metric("sprung_acceleration", "maximum", name="kick")
+    droop = Metric("stroke", "maximum", from_rest=True, name="droop")
+    bump = roads.cosine_bump(0.05, start=0.1, duration=0.25)
+    result = tune.minimise(kick, car, bump, limits={droop: 0.015}, max_steps=10, duration=1.0, dt=2e-3)
+    assert not result.without_effect and result.after["droop"] == pytest.approx(0.015, rel=1e-3)

@@ -14,6 +14,7 @@ from scipy.optimize import minimize
 from jaxdamp import Ride, dampers, parameters, roads, sweep, tune, vehicles
 from jaxdamp.metrics import Metric
 from jaxdamp.tune import rescoring
+from jaxdamp.tune.descending import balanced
 from jaxdamp.tune.limits import in_each, limit_ranges, lost_limits
 
 
@@ -138,6 +139,28 @@ def test_the_smallest_largest_value_is_at_a_kink() -> None:
     np.testing.assert_allclose(ends, found.x, rtol=1e-3)
     first, second, third, *_ = np.sort(each(jnp.array(ends)))[::-1]
     assert first - second < 1e-9 * first < first - third
+
+
+def test_a_slope_is_balanced_by_weights_that_are_not_negative() -> None:
+    """Scenarios that are as bad balance each other only where no direction is better for all of them."""
+    ahead, back, wall = np.array([[1.0, 0.0]]), np.array([[-2.0, 0.0]]), np.array([[-4.0, 0.0]])
+    none = np.zeros((0, 2))
+    assert balanced(np.concatenate([ahead, 3.0 * ahead]), none)[0] == pytest.approx(1.0, rel=1e-5)
+    assert balanced(np.concatenate([ahead, back]), none)[0] == pytest.approx(0.0, abs=1e-9)
+    left, multipliers = balanced(ahead, np.concatenate([wall, -wall]))
+    assert left == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(multipliers, [0.25, 0.0], rtol=1e-5)
+    assert balanced(np.zeros((1, 2)), wall)[0] == 0.0 and balanced(np.zeros((2, 0)), np.zeros((1, 0)))[0] == 0.0
+
+
+def test_a_sweep_over_scenarios_takes_the_steps_of_its_steepest_end() -> None:
+    """With those of the start, the travel of stiff dampers at coarse steps was no number."""
+    bump = roads.step(0.02, start=0.05)
+    scenarios = tune.Scenarios([bump], [tune.Condition(), tune.Condition(factors={"sprung_mass": 1.2})], risk="worst")
+    run: dict[str, Any] = {"metrics": ["working_space_rms"], "duration": 0.3, "dt": 2e-3}
+    data = sweep(scenarios.ride(LINEAR, **run), {"damper.rate": [1500.0, 200e3]})
+    alone = scenarios.ride(parameters.replace(LINEAR, {"damper.rate": 200e3}), **run)()
+    assert float(data["working_space_rms"][1]) == pytest.approx(float(alone["working_space_rms"]), rel=1e-9)
 
 
 def test_tolerances_and_samples_are_conditions() -> None:

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from jaxdamp import dampers, roads, tune
-from jaxdamp.metrics import Metric
 from jaxdamp.solve import SequentialQuadratic
 from jaxdamp.tune import Outcome, Rescore, Status, TuneResult, minimising
 from jaxdamp.tune.limits import Limit, decided, half_interval, limit_ranges
@@ -341,13 +340,3 @@ def test_percentiles_over_fresh_roads():
     assert fresh.percentile(COMFORT, 50.0) == (1.0, 2.0) and fresh.percentile(COMFORT, 75.0) == (1.0, 3.0)
     with pytest.raises(ValueError, match="`percent`"):
         fresh.percentile(fresh.metric, 101.0)
-
-
-def test_a_parameter_that_meets_a_limit_is_not_without_effect():
-    """The largest acceleration on a bump comes from compression, the extension behind it from rebound."""
-    car = presets.quarter_car_000(dampers.Bilinear(2500.0, 2500.0))
-    kick = Metric("sprung_acceleration", "maximum", name="kick")
-    droop = Metric("stroke", "maximum", from_rest=True, name="droop")
-    bump = roads.cosine_bump(0.05, start=0.1, duration=0.25)
-    result = tune.minimise(kick, car, bump, limits={droop: 0.015}, max_steps=10, duration=1.0, dt=2e-3)
-    assert not result.without_effect and result.after["droop"] == pytest.approx(0.015, rel=1e-3)
