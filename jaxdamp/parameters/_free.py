@@ -211,6 +211,7 @@ def free_parameters(
     >>> free_parameters(half_car_002(Linear(1000.0)), over=["rate"], tie={"front.*.rate": "rear.*.rate"}).names
     ['rear.damper.rate']
     """
+    check_by_name("bounds", bounds)
     _checks.untraced("bounds", dict(bounds or {}), "Give plain numbers, which are known before a program is compiled.")
     names = ["**"] if over is None else name_patterns("over", over)
     all_parameters = _known(tree, names, tie)
@@ -226,7 +227,7 @@ def free_parameters(
         return {leaders.get(path, path) for path in paths}
 
     free = group(keep) - group(frozen)
-    limits = _limits_by_path(known, free, leaders, bounds or {})
+    limits = limits_by_path(known, free, leaders, bounds or {})
     linear = free - {leader for path, leader in leaders.items() if not all_parameters[known.index(path)].linear}
     chosen = [
         dataclasses.replace(p, domain=_limited(p, limits.get(p.path), move=move), linear=p.linear and p.path in linear)
@@ -261,12 +262,20 @@ def _known(tree: object, names: Sequence[str], tie: object) -> list[Parameter]:
     return named_parameters(tree, [*names, *map(str, tied)])
 
 
-def _limits_by_path(
-    known: Sequence[str], free: set[str], leaders: Mapping[str, str], bounds: Mapping[str, tuple[float, float]]
+def limits_by_path(
+    known: Sequence[str],
+    free: Collection[str],
+    leaders: Mapping[str, str],
+    bounds: Mapping[str, tuple[float, float]],
 ) -> dict[str, tuple[float, float]]:
-    """Extra limits by path, checked. If two names match a parameter, the later one counts."""
-    if not isinstance(bounds, Mapping):
-        _checks.refuse("bounds", "be a mapping as {'rate': (1000.0, 5000.0)}", repr(bounds))
+    """Extra limits by path, checked. If two names match a parameter, the later one counts.
+
+    Arguments:
+        known: all paths.
+        free: those that may change; a bound of another one is refused.
+        leaders: the path whose value each tied parameter takes.
+        bounds: a lower and an upper limit by name or pattern.
+    """
     limits = {}
     for name, pair in bounds.items():
         ends = np.asarray(pair)
@@ -275,7 +284,7 @@ def _limits_by_path(
             remedy = "For a side without a limit, give a number that is never reached."
             _checks.refuse(f"bounds[{name!r}]", "be two finite numbers in increasing order", pair, remedy)
         named = [leaders.get(path, path) for path in match_paths(known, [name])]
-        if free and not free & set(named):
+        if free and not {*free} & set(named):
             remedy = "Remove it from `freeze`, or leave out its bounds: frozen parameters need none."
             _checks.refuse(f"bounds[{name!r}]", "bound a parameter that is free", "one that is not", remedy)
         limits |= dict.fromkeys(named, (float(pair[0]), float(pair[1])))

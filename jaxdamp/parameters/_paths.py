@@ -282,3 +282,23 @@ def name_patterns(argument: str, names: object) -> list[str]:
         remedy = "Write ['damper.rate'], or a pattern such as ['damper.**_rate']."
         _checks.refuse(argument, "be names of parameters", repr(names), remedy)
     return listed
+
+
+EXAMPLES = {
+    "bounds": "{'rate': (1000.0, 5000.0)}",
+    "priors": "{'rebound_rate': (2500.0, 200.0)}",
+    "tie": "{'front.damper.**': 'rear.damper.**'}",
+}
+
+
+def check_by_name(argument: str, given: object) -> None:
+    """Refuse what is neither `None` nor a mapping from names or patterns of parameters.
+
+    Arguments:
+        argument: "bounds", "priors" or "tie".
+        given: its value.
+    """
+    if not isinstance(given, Mapping | None):
+        remedy = f"Write {argument}={EXAMPLES[argument]}."
+        _checks.refuse(argument, "be a mapping from names of parameters", _checks.described(given), remedy)
+    name_patterns(argument, [*(given or ())])

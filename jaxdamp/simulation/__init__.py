@@ -34,7 +34,11 @@ from jaxdamp.simulation.settings import (
     SimulationSettings as SimulationSettings,
 )
 from jaxdamp.simulation.stability import substeps_needed
-from jaxdamp.simulation.stationary import DEVIATIONS as DEVIATIONS, stationary_notes as stationary_notes
+from jaxdamp.simulation.stationary import (
+    DEVIATIONS as DEVIATIONS,
+    refuse_without_stationary_motion as refuse_without_stationary_motion,
+    stationary_notes as stationary_notes,
+)
 from jaxdamp.simulation.step_size import CoarseStepWarning, RunCheck as RunCheck, TracedStepWarning
 from jaxdamp.simulation.stepper import AbstractStepper, ControlledStepper as ControlledStepper, Controller as Controller
 from jaxdamp.simulation.wheels import (

@@ -20,7 +20,7 @@ from jaxdamp._types import Point, Scalar
 from jaxdamp.metrics import Metric, MetricValues
 from jaxdamp.parameters import checked, get, match_paths, modules_inside, replace, with_values
 from jaxdamp.roads import WhiteRoad
-from jaxdamp.simulation import Ride, moves_axles
+from jaxdamp.simulation import Ride, moves_axles, refuse_without_stationary_motion
 from jaxdamp.tune.settings import Run
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -158,8 +158,10 @@ class ScenarioRide(eqx.Module):
         by_name = _on_white_roads(self, vehicle) if white else _in_each(self, vehicle)
         known = [number for value in by_name.values() if (number := _checks.concrete(value)) is not None]
         lost = np.flatnonzero(~np.any(np.isfinite(known), axis=0)) if white and known else np.zeros(0, int)
-        if lost.size and np.ndim(known[0]) == 1:  # the ride by itself refuses laws without a stationary motion
-            _in_one(self, vehicle, *jax.tree.map(lambda leaf: leaf[lost[0]], (self.roads, self.factors, self.offsets)))
+        if lost.size and np.ndim(known[0]) == 1:
+            each = self.roads, self.factors, self.offsets
+            road, factors, offsets = jax.tree.map(lambda leaf: leaf[lost[0]], each)
+            refuse_without_stationary_motion(_in(vehicle, factors, offsets), road)
         return MetricValues.with_units({m.name: by_name[m.name] for m in self.metrics}, self.units)
 
     def refuse_moved_axles(self, argument: str, build: Callable[[T], AbstractVehicle], values: T) -> None:
@@ -184,10 +186,14 @@ def _in_one(
     offsets: dict[str, Array],
 ) -> dict[str, Scalar]:
     """The metrics of a vehicle by name in one scenario."""
-    changed = _changed(vehicle, {path: (factors[path], offsets[path]) for path in factors})
-    ride = scenarios.ride.of_vehicle(changed)
+    ride = scenarios.ride.of_vehicle(_in(vehicle, factors, offsets))
     field = "road" if isinstance(road, WhiteRoad) else "heights"
     return dict(eqx.tree_at(lambda ride: getattr(ride, field), ride, road)())
+
+
+def _in(vehicle: AbstractVehicle, factors: dict[str, Array], offsets: dict[str, Array]) -> AbstractVehicle:
+    """The vehicle in one scenario."""
+    return _changed(vehicle, {path: (factors[path], offsets[path]) for path in factors})
 
 
 def _in_each(scenarios: ScenarioRide, vehicle: AbstractVehicle) -> dict[str, Float[Array, " scenarios"]]:
