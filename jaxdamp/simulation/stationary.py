@@ -51,7 +51,12 @@ def stationary_metrics(vehicle: AbstractVehicle, road: WhiteRoad, metrics: Seque
 
 
 def refuse_without_stationary_motion(vehicle: AbstractVehicle, road: WhiteRoad) -> None:
-    """Refuse a vehicle of which none was found, or that does not come to rest: all its metrics are infinite."""
+    """Refuse a vehicle of which none was found, or that does not come to rest: all its metrics are infinite.
+
+    Arguments:
+        vehicle: with its laws.
+        road: a white one.
+    """
     stationary_rms(vehicle, road.velocity_psd, speed=road.speed)
 
 

@@ -169,7 +169,7 @@ def test_white_roads_without_a_stationary_motion_are_refused_after_one_computati
     driven, drive = [], ride_module._drive
     monkeypatch.setattr(ride_module, "_drive", lambda *args: driven.append(args) or drive(*args))
     scenarios = tune.Scenarios(WHITE).ride(WILD, metrics=[ACCELERATION])
-    with pytest.raises(ValueError, match="have a stationary motion .* none was found: damper"):
+    with pytest.raises(ValueError, match=r"have a stationary motion .* none was found: damper"):
         scenarios.each()
     assert len(driven) <= 1  # traced, for all roads at once
 
