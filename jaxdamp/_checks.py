@@ -200,7 +200,7 @@ def instance(argument: str, value: object, kinds: type | tuple[type, ...], must:
 def counts(**values: int | None) -> None:
     """Refuse counts that are not whole or below one; None stands for one that was left out."""
     for argument, value in values.items():
-        if value is not None and not hasattr(value, "__index__"):
+        if value is not None and (not hasattr(value, "__index__") or np.ndim(value)):
             refuse(argument, "be a whole number", described(value))
         if value is not None and value < 1:
             refuse(argument, "be 1 or more", value)
@@ -223,6 +223,8 @@ def part_of(argument: str, text: str) -> tuple[int, int]:
 def one_of(argument: str, value: str, choices: Iterable[str]) -> None:
     """Refuse a text that is not among the choices; suggest the nearest one."""
     choices = list(choices)
+    if not isinstance(value, str):  # which may be an array, and is near to no word
+        refuse(argument, f"be one of {', '.join(map(repr, choices))}", described(value))
     if value not in choices:
         near = nearest(value, choices)
         hint = f"Did you mean {near!r}?" if near else ""

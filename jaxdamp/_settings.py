@@ -11,13 +11,16 @@ Function = TypeVar("Function", bound=Callable[..., object])
 S = TypeVar("S", bound=Mapping[str, object])  # a `TypedDict`
 
 
-def with_defaults(defaults: Mapping[str, object], **others: object) -> Callable[[Function], Function]:
+def with_defaults(
+    defaults: Mapping[str, object], *, check: Callable[[Mapping[str, object]], None] | None = None, **others: object
+) -> Callable[[Function], Function]:
     """A function of `**settings: Unpack[Settings]` that always gets all of these keywords.
 
     Its signature has one keyword for each of them, which `help` shows and editors complete.
 
     Arguments:
         defaults: of all keywords that `Settings` describes.
+        check: refuses wrong values of them, before the function is called.
         others: defaults that this function has instead.
 
     Raises:
@@ -43,7 +46,10 @@ def with_defaults(defaults: Mapping[str, object], **others: object) -> Callable[
                     listed = ", ".join(n for n, p in names.items() if p.kind is p.KEYWORD_ONLY)
                     hint = f"did you mean {near[0]!r}?" if near else f"it has {listed}."
                     raise TypeError(f"{function.__name__} has no argument {name!r}: {hint}")
-            return function(*args, **{**known, **given})
+            complete = {**known, **given}
+            if check is not None:
+                check(complete)
+            return function(*args, **complete)
 
         call.__dict__["__signature__"] = signature.replace(parameters=[*names.values()])
         return cast(Function, call)

@@ -26,7 +26,7 @@ from jaxdamp.identify.model import Model, on_rig, rig_of
 from jaxdamp.identify.reducing import reduced
 from jaxdamp.identify.rungs import Failure, Rung, verdict
 from jaxdamp.identify.scheduling import fit_scheduled, settings_stated
-from jaxdamp.identify.settings import COMPARISON, FIT, ComparisonSettings
+from jaxdamp.identify.settings import COMPARISON, FIT, ComparisonSettings, check_keywords
 from jaxdamp.identify.starting import LearntStart, Start, check_starts, frozen_by, started
 from jaxdamp.identify.stated import start_paths
 from jaxdamp.identify.vehicle_comparing import VehicleComparison, compare_vehicles
@@ -119,7 +119,7 @@ def of_any_kind(compare: Callable[P, Comparison]) -> CompareCall[P]:
 
 @of_any_kind
 @of_known_numbers
-@with_defaults(COMPARISON)
+@with_defaults(COMPARISON, check=check_keywords)
 def compare(
     laws: Mapping[str, Start],
     runs: Iterable[BenchRun],
@@ -190,7 +190,7 @@ def compare(
     return comparison
 
 
-@with_defaults(COMPARISON)
+@with_defaults(COMPARISON, check=check_keywords)
 def fit_each(
     laws: Mapping[str, Start],
     runs: Sequence[BenchRun],

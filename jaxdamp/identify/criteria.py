@@ -105,7 +105,9 @@ def priors_on(free: FreeParameters, priors: Mapping[str, tuple[float, float]]) -
     named: dict[str, str] = {}
     paths = [p.path for p in free.chosen]
     for name, pair in priors.items():
-        if np.shape(pair) != (2,) or not np.all(np.isfinite(pair)) or not pair[1] > 0:
+        numbers = np.asarray(pair)
+        plain = numbers.shape == (2,) and numbers.dtype.kind in "iuf" and np.all(np.isfinite(numbers))
+        if not plain or not numbers[1] > 0:
             must = "be a mean and a positive standard deviation"
             _checks.refuse(f"priors[{name!r}]", must, pair, "Write {'rebound_rate': (2500.0, 200.0)}.")
         if not matching(paths, name):

@@ -30,7 +30,7 @@ from jaxdamp.identify.preparing import prepare, records_in_words, weighting_of
 from jaxdamp.identify.printed import evaluator
 from jaxdamp.identify.problem import Problem, linearised
 from jaxdamp.identify.search import SearchEnd, Solver
-from jaxdamp.identify.settings import FIT, PROBLEM, FitSettings, ScheduledSettings, TargetSettings
+from jaxdamp.identify.settings import FIT, PROBLEM, FitSettings, ScheduledSettings, TargetSettings, check_keywords
 from jaxdamp.identify.several import Solution, search_from
 from jaxdamp.identify.starting import Start
 from jaxdamp.identify.targets import Goal, Numbers, TargetFit, fit_targets
@@ -109,7 +109,7 @@ def of_any_records(
 
 @of_any_records(fit_vehicle, fit_many)
 @of_known_numbers
-@with_defaults(FIT)
+@with_defaults(FIT, check=check_keywords)
 def fit(
     law: Start, runs: BenchRun | Iterable[BenchRun], *, rig: Machine = None, **settings: Unpack[FitSettings]
 ) -> FitResult:

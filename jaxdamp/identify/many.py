@@ -39,7 +39,7 @@ from jaxdamp.identify.many_records import (
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.model import initial_state_for, own_names, rig_of
 from jaxdamp.identify.preparing import Beginning, weights
-from jaxdamp.identify.settings import FIT, FitSettings
+from jaxdamp.identify.settings import FIT, FitSettings, check_keywords
 from jaxdamp.identify.several import other_starts
 from jaxdamp.identify.starting import Start
 from jaxdamp.parameters import FreeParameters, name_patterns
@@ -52,7 +52,7 @@ STARTED_FROM = 12  # dampers whose records give the start of a law class
 
 @of_known_numbers
 @one_thread()
-@with_defaults(FIT, starts=1)
+@with_defaults(FIT, check=check_keywords, starts=1)
 def fit_many(
     law: Start,
     dampers: Mapping[str, BenchRun | Iterable[BenchRun]] | Iterable[BenchRun | Iterable[BenchRun]],

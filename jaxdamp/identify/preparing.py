@@ -33,7 +33,7 @@ from jaxdamp.identify.model import (
 )
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.record_starts import first_states
-from jaxdamp.identify.settings import PROBLEM, ProblemSettings
+from jaxdamp.identify.settings import PROBLEM, ProblemSettings, check_keywords
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.identify.stated import stated_parameters, stated_values, with_stated
 from jaxdamp.identify.traces import batches_of_each, places
@@ -44,7 +44,7 @@ FIT_OUTSIDE = "Call it outside `jax.jit`, `jax.grad` and `jax.vmap`; the residua
 
 
 @of_known_numbers
-@with_defaults(PROBLEM)
+@with_defaults(PROBLEM, check=check_keywords)
 def prepare(
     law: Start, runs: BenchRun | Iterable[BenchRun], *, rig: Machine = None, **settings: Unpack[ProblemSettings]
 ) -> Problem:

@@ -29,7 +29,7 @@ from jaxdamp.identify.machine import OFFSET, Machine, held_constant_forces, refu
 from jaxdamp.identify.model import Model, OnRig, law_of, own_names, rig_of
 from jaxdamp.identify.predicting import score
 from jaxdamp.identify.preparing import prepare
-from jaxdamp.identify.settings import FIT, PROBLEM, SCHEDULED, FitSettings, ScheduledSettings
+from jaxdamp.identify.settings import FIT, PROBLEM, SCHEDULED, FitSettings, ScheduledSettings, check_keywords
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.identify.stated import COMMAND_REMEDY, refuse_lacking, stated_parameters
 from jaxdamp.parameters import get, match_paths, name_patterns, parameters, with_values
@@ -158,7 +158,7 @@ class ScheduledFit(AbstractResult):
 
 
 @of_known_numbers
-@with_defaults(SCHEDULED)
+@with_defaults(SCHEDULED, check=check_keywords)
 def fit_scheduled(
     law: Start, runs: Iterable[BenchRun], *, rig: Machine = OFFSET, **settings: Unpack[ScheduledSettings]
 ) -> ScheduledFit:

@@ -4,11 +4,13 @@ They are written in the call, or kept for several calls: each class makes a dict
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TypedDict
+from typing import TypedDict, cast
 
 import numpy as np
 
+from jaxdamp import _checks
 from jaxdamp.identify.search import Solver
+from jaxdamp.parameters import BY_NAME, check_by_name, name_patterns
 
 
 class Free(TypedDict, total=False):
@@ -189,3 +191,14 @@ VEHICLE: VehicleSettings = {
     "seed": 0, "solver": None,
 }  # fmt: skip
 TARGETS: TargetSettings = {**FREE, "loss": "squares", "max_steps": 100, "starts": 4, "seed": 0, "solver": None}
+
+
+def check_keywords(settings: Mapping[str, object]) -> None:
+    """Refuse what is no name of parameters, no mapping from them or no count, before any part of a fit reads it."""
+    for argument, value in settings.items():
+        if argument in BY_NAME:
+            check_by_name(argument, value)
+        elif argument in ("freeze", "per_record", "common") or (argument == "over" and value is not None):
+            name_patterns(argument, value)
+        elif argument == "samples_per_cycle":
+            _checks.counts(samples_per_cycle=cast(int | None, value))

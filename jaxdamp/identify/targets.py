@@ -27,9 +27,18 @@ from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.residuals import AbstractResiduals
 from jaxdamp.identify.result import Fit
 from jaxdamp.identify.search import SearchEnd
-from jaxdamp.identify.settings import TARGETS, Free, TargetSettings
+from jaxdamp.identify.settings import TARGETS, Free, TargetSettings, check_keywords
 from jaxdamp.identify.several import Solution, equally_good, search_scattered
-from jaxdamp.parameters import FreeParameters, Parameter, free_parameters, interval, match_paths, name_patterns, real
+from jaxdamp.parameters import (
+    FreeParameters,
+    Parameter,
+    free_parameters,
+    interval,
+    limits_by_path,
+    match_paths,
+    name_patterns,
+    real,
+)
 from jaxdamp.simulation import Ride
 
 
@@ -135,7 +144,7 @@ class TargetResiduals(AbstractResiduals):
 
 @of_known_numbers
 @one_thread()
-@with_defaults(TARGETS)
+@with_defaults(TARGETS, check=check_keywords)
 def fit_targets(
     numbers: Numbers,
     start: PyTree,
@@ -282,11 +291,11 @@ def _free_numbers(
     names = [*start]
     if with_point := [name for name in names if "." in name]:
         _checks.refuse("start", "have names without a point", repr(with_point[0]))
-    limits = {name: pair for key, pair in bounds.items() for name in match_paths(names, [key])}
     chosen = names if over is None else match_paths(names, name_patterns("over", over))
     held = match_paths(names, name_patterns("freeze", freeze))
+    limits = limits_by_path(names, {*chosen} - {*held}, {}, bounds)
     tree = {name: jnp.asarray(value, float) for name, value in start.items()}
-    domains = {name: interval(*map(float, limits[name])) if name in limits else real for name in names}
+    domains = {name: interval(*limits[name]) if name in limits else real for name in names}
     free = tuple(Parameter(n, tree[n], "", n, domains[n], False) for n in chosen if n not in held)
     for p in free:
         if not p.domain.contains(np.asarray(p.value)):

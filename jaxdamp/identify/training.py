@@ -28,6 +28,7 @@ from jaxdamp.identify.model import Model, law_of, rig_of, with_range
 from jaxdamp.identify.predicting import score
 from jaxdamp.identify.preparing import prepare, weighting_of
 from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.settings import check_keywords
 from jaxdamp.identify.starting import Start
 from jaxdamp.identify.traces import Batch, batches
 from jaxdamp.parameters import Coordinates, listed
@@ -135,7 +136,7 @@ class Training(AbstractFitted):
 
 
 @of_known_numbers
-@with_defaults(TRAIN)
+@with_defaults(TRAIN, check=check_keywords)
 def train(
     law: Start,
     runs: BenchRun | Iterable[BenchRun],

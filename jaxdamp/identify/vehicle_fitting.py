@@ -23,7 +23,7 @@ from jaxdamp.identify.model import VehicleTest, own_names, spread, with_means
 from jaxdamp.identify.noise import Noise, channel_noise
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd, search
-from jaxdamp.identify.settings import VEHICLE, VehicleSettings
+from jaxdamp.identify.settings import VEHICLE, VehicleSettings, check_keywords
 from jaxdamp.identify.several import Solution, search_scattered
 from jaxdamp.identify.vehicle_left_out import friction_left_out, on_free_scale, on_sensors, on_signs, on_units
 from jaxdamp.identify.vehicle_preparing import (
@@ -54,7 +54,7 @@ MOST_CHECKS = 4  # of whether `simulate` accepts the vehicle at the minimum
 
 @of_known_numbers
 @one_thread()
-@with_defaults(VEHICLE)
+@with_defaults(VEHICLE, check=check_keywords)
 def fit_vehicle(
     vehicle: AbstractVehicle,
     records: RideRecord | Iterable[RideRecord],

@@ -34,9 +34,11 @@ from jaxdamp.parameters._domains import (
     real,
     weight as weight,
 )
-from jaxdamp.parameters._free import FreeParameters as FreeParameters, free_parameters
+from jaxdamp.parameters._free import FreeParameters as FreeParameters, free_parameters, limits_by_path as limits_by_path
 from jaxdamp.parameters._paths import (
+    BY_NAME as BY_NAME,
     AbstractDeclared as AbstractDeclared,
+    check_by_name as check_by_name,
     check_parameters as check_parameters,
     checked as checked,
     get,

@@ -14,6 +14,8 @@ from jaxdamp import _checks
 from jaxdamp.parameters._declaration import Parameter
 from jaxdamp.parameters._domains import interval, ordered_interval
 from jaxdamp.parameters._paths import (
+    BY_NAME,
+    check_by_name,
     expression,
     match_parameters,
     match_paths,
@@ -24,7 +26,6 @@ from jaxdamp.parameters._paths import (
 
 
 INSIDE = 0.02  # of the width of bounds, by which a start is moved inside
-EXAMPLE = "Write for example tie={'front.damper.**': 'rear.damper.**'}: the front takes the values of the rear."
 
 
 def resolve_ties(known: Sequence[Parameter], tie: Mapping[str, str] | None, *, move: bool = False) -> dict[str, str]:
@@ -40,12 +41,8 @@ def resolve_ties(known: Sequence[Parameter], tie: Mapping[str, str] | None, *, m
         ValueError: names that fit no parameter or no partner; a parameter tied twice or in a circle; partners of
             another unit, shape or domain, or with another value to start from.
     """
-    if not isinstance(tie, Mapping | None):
-        _checks.refuse("tie", "be a mapping of names to names", repr(tie), EXAMPLE)
     by_path, leaders = {p.path: p for p in known}, {}
     for follower, leader in (tie or {}).items():
-        if not isinstance(follower, str) or not isinstance(leader, str):
-            _checks.refuse("tie", "be a mapping of names to names", repr(tie), EXAMPLE)
         candidates = match_paths(list(by_path), [leader])
         for path in match_paths(list(by_path), [follower]):
             partner = _partner(path, follower, leader, candidates)
@@ -72,7 +69,7 @@ def _partner(path: str, follower: str, leader: str, candidates: Sequence[str]) -
         chosen = [c for c in candidates if _wildcards(leader, c) == _wildcards(follower, path)]
     if len(chosen) != 1:
         found = f"{len(chosen)} of them, {', '.join(chosen)}" if chosen else "none"
-        remedy = f"{EXAMPLE} The parameters that {leader!r} names are {', '.join(candidates)}."
+        remedy = f"{BY_NAME['tie'][1]} The parameters that {leader!r} names are {', '.join(candidates)}."
         _checks.refuse(f"tie[{follower!r}]", f"name one parameter that {path} takes its value from", found, remedy)
     return chosen[0]
 
@@ -100,7 +97,7 @@ def _last(path: str, leaders: Mapping[str, str]) -> str:
     while seen[-1] in leaders:
         seen.append(leaders[seen[-1]])
         if seen[-1] in seen[:-1]:
-            _checks.refuse("tie", "not lead back to its own start", " -> ".join(seen), EXAMPLE)
+            _checks.refuse("tie", "not lead back to its own start", " -> ".join(seen), BY_NAME["tie"][1])
     return seen[-1]
 
 
@@ -212,6 +209,7 @@ def free_parameters(
     ['rear.damper.rate']
     """
     check_by_name("bounds", bounds)
+    check_by_name("tie", tie)
     _checks.untraced("bounds", dict(bounds or {}), "Give plain numbers, which are known before a program is compiled.")
     names = ["**"] if over is None else name_patterns("over", over)
     all_parameters = _known(tree, names, tie)
@@ -256,10 +254,9 @@ def _moved_inside(free: FreeParameters, bounded: Collection[str], *, move: bool)
     return free.started_at(np.where(outside, np.clip(values, least, most), values))
 
 
-def _known(tree: object, names: Sequence[str], tie: object) -> list[Parameter]:
+def _known(tree: object, names: Sequence[str], tie: Mapping[str, str] | None) -> list[Parameter]:
     """All parameters, and the commands that are named or tied."""
-    tied = (*tie, *tie.values()) if isinstance(tie, Mapping) else ()  # anything else is refused where ties are resolved
-    return named_parameters(tree, [*names, *map(str, tied)])
+    return named_parameters(tree, [*names, *(tie or {}), *(tie or {}).values()])
 
 
 def limits_by_path(

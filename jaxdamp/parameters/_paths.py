@@ -284,10 +284,16 @@ def name_patterns(argument: str, names: object) -> list[str]:
     return listed
 
 
-EXAMPLES = {
-    "bounds": "{'rate': (1000.0, 5000.0)}",
-    "priors": "{'rebound_rate': (2500.0, 200.0)}",
-    "tie": "{'front.damper.**': 'rear.damper.**'}",
+BY_NAME = {  # what a mapping from names is to be, and how to write it
+    "bounds": ("be a mapping of names to limits", "Write for example bounds={'rate': (1000.0, 5000.0)}."),
+    "priors": (
+        "be a mapping of names to means and standard deviations",
+        "Write for example priors={'rebound_rate': (2500.0, 200.0)}.",
+    ),
+    "tie": (
+        "be a mapping of names to names",
+        "Write for example tie={'front.damper.**': 'rear.damper.**'}: the front takes the values of the rear.",
+    ),
 }
 
 
@@ -298,7 +304,7 @@ def check_by_name(argument: str, given: object) -> None:
         argument: "bounds", "priors" or "tie".
         given: its value.
     """
-    if not isinstance(given, Mapping | None):
-        remedy = f"Write {argument}={EXAMPLES[argument]}."
-        _checks.refuse(argument, "be a mapping from names of parameters", _checks.described(given), remedy)
-    name_patterns(argument, [*(given or ())])
+    must, remedy = BY_NAME[argument]
+    names = [*given, *(given.values() if argument == "tie" else ())] if isinstance(given, Mapping) else []
+    if not isinstance(given, Mapping | None) or not all(isinstance(name, str) for name in names):
+        _checks.refuse(argument, must, repr(given), remedy)

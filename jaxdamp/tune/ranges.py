@@ -240,7 +240,7 @@ def _adjustable(vehicle: object) -> tuple[list[str], tuple[str, ...]]:
 
 def _given(argument: str, bounds: Mapping[str, object], free: FreeParameters) -> dict[str, Pair | Choice]:
     """Bounds by path, infinite without a bound. If two names match a parameter, the later one counts."""
-    if not isinstance(bounds, Mapping):
+    if not isinstance(bounds, Mapping) or not all(isinstance(name, str) for name in bounds):
         remedy = "Write `{'damper.rate': (1000.0, 5000.0)}`."
         _checks.refuse(argument, "be a mapping of parameters to bounds", _checks.described(bounds), remedy)
     every, leaders, by_path = named_parameters(free.tree, bounds), dict(free.ties), {}
