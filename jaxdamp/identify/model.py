@@ -36,6 +36,7 @@ Tree = TypeVar("Tree")
 STARTS = "records."  # with which the paths of the states at the beginning of records begin
 
 
+FORGOTTEN = 7.0  # time constants, after which 0.1 % is left of how a filter began
 START_PATH = STARTS + "{}.initial_state"  # by the number of the record
 
 
@@ -253,10 +254,19 @@ def spread(model: Tree, paths: Sequence[str], records: int) -> Tree:
     return with_values(model, {path: jnp.full(records, get(model, path)) for path in paths})
 
 
+def memory_of_machine(model: Model) -> float:
+    """How long the machine remembers the motion before [s]: zero without delay and lags, little with short ones."""
+    rig = rig_of(model)
+    if rig is None:
+        return 0.0
+    lags = (np.max(np.asarray(lag)) for lag in (rig.force_lag, rig.command_lag))
+    return float(FORGOTTEN * max(lags) + np.max(np.abs(np.asarray(rig.force_delay))))
+
+
 def blind_end(model: Model, dt: float) -> int:
     """So many samples at the end of a record cannot be predicted: their force needs the motion behind the end."""
     rig = rig_of(model)
-    if rig is None or not rig.effects():
+    if rig is None or not {"inertia", "delay"} & {*rig.effects()}:  # the others need the motion before
         return 0
     return 2 + int(np.ceil(np.max(np.abs(np.asarray(rig.force_delay))) / dt))
 

@@ -14,7 +14,17 @@ from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import require_finite_force
 from jaxdamp.identify.initial_states import DRIFT, rest_window, start_of
-from jaxdamp.identify.model import Model, blind_end, initial_state_for, is_memoryless, law_of, of_record, starts_in
+from jaxdamp.identify.model import (
+    Model,
+    blind_end,
+    count_states,
+    initial_state_for,
+    is_memoryless,
+    law_of,
+    memory_of_machine,
+    of_record,
+    starts_in,
+)
 from jaxdamp.identify.printed import predicted as predicted_by_c
 from jaxdamp.identify.record_starts import with_first_states
 from jaxdamp.identify.rows import samples_in_block, settling_samples
@@ -104,7 +114,10 @@ def _first_used(model: Model, run: BenchRun, initial_state: str) -> int:
         if rest_window(run):
             return rest_window(run)
         start = "warm_up"
-    return settling_samples(run, 1.0 / run.sampling_rate) if start == "warm_up" else 0
+    if start != "warm_up":
+        return 0
+    settled = settling_samples(run, 1.0 / run.sampling_rate)
+    return settled if count_states(model) else min(settled, round(memory_of_machine(model) * run.sampling_rate))
 
 
 class Score(NamedTuple):

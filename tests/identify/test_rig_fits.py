@@ -22,6 +22,8 @@ from jaxdamp.dampers import (
 )
 from jaxdamp.export import from_json, to_json
 from jaxdamp.identify.machine import lag_time
+from jaxdamp.identify.model import on_rig
+from jaxdamp.identify.predicting import score
 from jaxdamp.parameters import get
 from jaxdamp.rig import Rig
 
@@ -90,6 +92,14 @@ def test_the_machine_is_kept_with_the_result(result):
     assert from_json(to_json(result.rig)).force_delay == result.rig.force_delay
     assert result.to_dict()["rig"].startswith("Rig(gas_force=-120.0")
     assert result.law.fitted_to is not None
+
+
+def test_a_lag_of_nothing_is_scored_as_none():
+    """Such as one that a fit ends at: all samples count that do with a lag of zero."""
+    (run,) = records(LAW, Rig(force_lag=2e-3), [SineTest(0.02, 4.0)])
+    none, least, short = (score(on_rig(START, Rig(force_lag=lag)), [run]) for lag in (0.0, 2e-9, 1e-5))
+    assert least[:2] == pytest.approx(none[:2], rel=1e-6)
+    assert short[:2] == pytest.approx(none[:2], rel=1e-2)
 
 
 def test_gas_and_offset_cannot_be_told_apart():
