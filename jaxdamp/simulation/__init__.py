@@ -10,7 +10,7 @@ from jaxdamp.simulation.equations import Equations, RoadInput, StepState as Step
 from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.fixed_step import AbstractFixedStep
 from jaxdamp.simulation.harmonic import HarmonicResponse as HarmonicResponse, harmonic_response
-from jaxdamp.simulation.many_designs import steepest as steepest
+from jaxdamp.simulation.many_designs import Designs as Designs
 from jaxdamp.simulation.notes import (
     far_outside as far_outside,
     named_laws as named_laws,
@@ -33,7 +33,7 @@ from jaxdamp.simulation.settings import (
     Run as Run,
     SimulationSettings as SimulationSettings,
 )
-from jaxdamp.simulation.stability import substeps_needed
+from jaxdamp.simulation.stability import MOST as MOST, substeps_needed
 from jaxdamp.simulation.stationary import (
     DEVIATIONS as DEVIATIONS,
     refuse_without_stationary_motion as refuse_without_stationary_motion,

@@ -1,57 +1,99 @@
 """Steps for many designs of a vehicle: as many as the steepest needs; and which of them no step can follow."""
 
+import dataclasses
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Mapping
-from typing import TypeVar
+from typing import Generic, TypeVar, final
 
+import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 
-from jaxdamp.parameters import named_parameters, replace
-from jaxdamp.simulation.stability import LARGEST, substeps_needed
+from jaxdamp._types import Scalar
+from jaxdamp.parameters import named_parameters
+from jaxdamp.simulation.stability import LARGEST, MOST, each_needs
 from jaxdamp.vehicles import AbstractVehicle
 
 
 K = TypeVar("K")
+PIECE = 1024  # designs that are looked at side by side
 
 
-def steepest(
-    design: Callable[[dict[K, float]], AbstractVehicle], values: Mapping[K, Iterable[float]], dt: float
-) -> int:
-    """The most substeps that a design needs, of those that steps of dt [s] can follow; 1 without any.
+@final
+@dataclasses.dataclass(frozen=True)
+class Designs(Generic[K]):
+    """The designs of a vehicle with other numbers, and what they ask of steps between two instants.
 
     Arguments:
-        design: the vehicle with some of its numbers replaced.
-        values: to be tried of each number.
+        build: the vehicle with some of its numbers replaced; or several of them, such as one in each condition.
         dt: spacing of the instants [s].
+        several: whether these are several, with an axis for them in front of all numbers.
     """
-    chosen, most = dict[K, float](), 1
-    for name in [*values] * min(len(values), 2):  # twice, as the steepest value may depend on numbers after it
-        for value in values[name]:
-            there = {**chosen, name: value}
-            count = _needed(lambda there=there: design(there), dt) or 0
-            if count >= most:
-                chosen, most = there, count
-    return most
+
+    build: Callable[[dict[K, Scalar | float]], AbstractVehicle]
+    dt: float
+    several: bool = False
+
+    def needed(self, numbers: Mapping[K, float]) -> float:
+        """The substeps that a design needs, however many; infinite for what no vehicle can be."""
+        try:
+            return max(self._counts(self.build(dict(numbers)), self.several))
+        except ValueError:
+            return np.inf
+
+    def steepest(self, values: Mapping[K, Iterable[float]]) -> int:
+        """The most substeps that a combination of values needs, however many; 1 without any.
+
+        Values that no step can follow where all other numbers are those of the vehicle are left out.
+        """
+        alone = {name: [x for x in of if self.needed({name: x}) <= MOST] for name, of in values.items()}
+        chosen, most = dict[K, float](), 1
+        for name in [*alone] * min(len(alone), 2):  # twice, as the steepest value may depend on numbers after it
+            for value in alone[name]:
+                there = {**chosen, name: value}
+                count = self.needed(there)
+                if most <= count < np.inf:
+                    chosen, most = there, int(count)
+        return most
+
+    def each(self, columns: Mapping[K, np.ndarray]) -> np.ndarray:
+        """The substeps that each of many designs needs, however many, each of which a vehicle can be."""
+        count, found = len(next(iter(columns.values()))), list[int]()
+        for first in range(0, count, PIECE):
+            piece = {name: jnp.asarray(column[first : first + PIECE]) for name, column in columns.items()}
+            found += self._counts(eqx.filter_vmap(self.build)(piece), 1 + self.several)
+        return np.array(found).reshape(count, -1).max(axis=1)
+
+    def _counts(self, vehicles: AbstractVehicle, axes: int) -> list[int]:
+        """The substeps of each of several vehicles with so many axes in front of their numbers."""
+        found = list[int]()
+
+        def look(vehicle: AbstractVehicle) -> float:
+            found.extend(each_needs(vehicle, self.dt, np.inf))
+            return 0.0
+
+        for _ in range(axes):
+            look = eqx.filter_vmap(look)
+        look(vehicles)
+        return found
 
 
-def steepest_between(vehicle: AbstractVehicle, columns: Mapping[str, np.ndarray], dt: float) -> int:
-    """The same of a vehicle between the ends of values of its parameters, names as in `parameters.replace`."""
-    inside = {name: column[can_follow(vehicle, name, column, dt)] for name, column in columns.items()}
-    ends = {name: (float(column.min()), float(column.max())) for name, column in inside.items() if column.size}
-    return steepest(lambda point: replace(vehicle, point), ends, dt)
+def steepest_between(designs: Designs[str], vehicle: AbstractVehicle, columns: Mapping[str, np.ndarray]) -> int:
+    """The most substeps of designs between the ends of values of a vehicle's parameters (`Designs.steepest`)."""
+    inside = {name: column[can_follow(designs, vehicle, name, column)] for name, column in columns.items()}
+    return designs.steepest({name: (column.min(), column.max()) for name, column in inside.items() if column.size})
 
 
 def can_follow(
-    vehicle: AbstractVehicle, name: str, column: np.ndarray, dt: float, steps: float | int = np.inf
+    designs: Designs[str], vehicle: AbstractVehicle, name: str, column: np.ndarray, most: float = MOST
 ) -> np.ndarray:
-    """For which values of one parameter a vehicle is stable with so many substeps, or as many as an engine takes.
+    """For which values of one parameter a vehicle needs at most so many substeps.
 
     From the vehicle's own value on a parameter only gets steeper in each direction, or less steep.
     """
 
     def beyond(value: float) -> bool:
-        count = _needed(lambda: replace(vehicle, {name: value}), dt)
-        return count is None or LARGEST * count > steps
+        return designs.needed({name: value}) > most
 
     first, follows = named_parameters(vehicle, [name])[0], np.ones(column.shape, bool)
     if first.value.ndim:
@@ -64,9 +106,18 @@ def can_follow(
     return follows
 
 
-def _needed(design: Callable[[], AbstractVehicle], dt: float) -> int | None:
-    """The substeps that a design needs; None for what no vehicle can be, or no step can follow."""
-    try:
-        return substeps_needed(design(), dt)
-    except ValueError:
-        return None
+def too_steep(
+    designs: Designs[str], vehicle: AbstractVehicle, columns: Mapping[str, np.ndarray], steps: int
+) -> np.ndarray:
+    """Which of many points so many substeps cannot follow: a text, empty where they can."""
+    reasons, said = np.full(len(next(iter(columns.values()))), "", dtype=object), "a law is too steep for"
+    steps_said = f"{said} {steps} step{'s' * (steps > 1)} in {designs.dt:g} s: pass a shorter `dt`"
+    for name, column in columns.items():
+        left = np.flatnonzero(reasons == "")
+        wrong = left[~can_follow(designs, vehicle, name, column[left], steps / LARGEST)]
+        reasons[wrong] = f"with such a {name} {steps_said}"
+    left = np.flatnonzero(reasons == "")
+    inside = {name: column[left] for name, column in columns.items()}
+    if len(columns) > 1 and left.size and steepest_between(designs, vehicle, inside) * LARGEST > steps:
+        reasons[left[designs.each(inside) * LARGEST > steps]] = f"with these values together {steps_said}"
+    return reasons

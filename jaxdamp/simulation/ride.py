@@ -31,10 +31,11 @@ from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation.engine import AbstractEngine, check_control, chosen_engine
 from jaxdamp.simulation.equations import Equations, settled
 from jaxdamp.simulation.exponential import Exponential
-from jaxdamp.simulation.many_designs import can_follow, steepest_between
+from jaxdamp.simulation.many_designs import Designs, steepest_between, too_steep
 from jaxdamp.simulation.notes import range_uses
 from jaxdamp.simulation.observer import MetricObserver, recorded
 from jaxdamp.simulation.run import refuse_stacked, run_check, sampled
+from jaxdamp.simulation.stability import MOST
 from jaxdamp.simulation.stationary import (
     refuse_without_stationary_motion,
     stationary_dampers,
@@ -194,11 +195,16 @@ class Ride(eqx.Module):
         object.__setattr__(other, "layout", self.engine.layout(states, side_by_side=True))
         return other
 
-    def reaching(self, columns: Mapping[str, np.ndarray]) -> "Ride":
-        """The same with as many substeps as the steepest of these values need, if they were not asked for."""
+    def reaching(self, columns: Mapping[str, np.ndarray], designs: Designs[str] | None = None) -> "Ride":
+        """The same with as many substeps as the steepest of these values need, if they were not asked for.
+
+        Arguments:
+            columns: values of parameters by name.
+            designs: the vehicles with them, if it is not this one alone.
+        """
         if not self.chooses_steps:
             return self
-        count = steepest_between(self.vehicle, columns, self.dt)
+        count = min(steepest_between(designs or self._designs(), self.vehicle, columns), MOST)
         assert isinstance(self.engine, Exponential)
         engine = dataclasses.replace(self.engine, substeps=max(count, self.substeps))
         return eqx.tree_at(lambda ride: ride.engine, self, engine)
@@ -246,17 +252,22 @@ class Ride(eqx.Module):
             return {}
         return stationary_dampers(replace(self.vehicle, dict(point or {})), self.road)
 
-    def out_of_domain(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Why the vehicle cannot have the values of each of many points: a text, empty where it can."""
+    def out_of_domain(self, columns: Mapping[str, np.ndarray], designs: Designs[str] | None = None) -> np.ndarray:
+        """Why the vehicle cannot have the values of each of many points: a text, empty where it can.
+
+        Arguments:
+            columns: values of parameters by name, one for each point.
+            designs: the vehicles with them, if it is not this one alone.
+        """
         reasons = outside_domains(self.vehicle, columns)
-        if isinstance(self.road, WhiteRoad) or not isinstance(self.engine, Exponential):
-            return reasons
-        for name, column in columns.items():
-            left = np.flatnonzero(reasons == "")
-            wrong = left[~can_follow(self.vehicle, name, column[left], self.dt, self.substeps)]
-            steps = f"{self.substeps} step{'s' * (self.substeps > 1)} in {self.dt:g} s"
-            reasons[wrong] = f"with such a {name} a law is too steep for {steps}: pass a shorter `dt`"
+        left = np.flatnonzero(reasons == "")
+        if left.size and not isinstance(self.road, WhiteRoad) and isinstance(self.engine, Exponential):
+            inside = {name: column[left] for name, column in columns.items()}
+            reasons[left] = too_steep(designs or self._designs(), self.vehicle, inside, self.substeps)
         return reasons
+
+    def _designs(self) -> Designs[str]:
+        return Designs(functools.partial(replace, self.vehicle), self.dt)
 
     def __call__(self, point: Point | None = None) -> dict[str, Scalar]:
         """The metrics by name, with other values of the parameters at these paths."""

@@ -99,10 +99,15 @@ def substeps_needed(vehicle: AbstractVehicle, dt: float) -> int:
     Raises:
         ValueError: a vehicle whose numbers are not known, as inside `jax.jit`.
     """
-    cars = known_cars(known_system(vehicle), _checks.plain_number("dt", dt))
+    return max(each_needs(vehicle, _checks.plain_number("dt", dt), MOST))
+
+
+def each_needs(vehicle: AbstractVehicle, dt: float, most: int | float) -> list[int]:
+    """The same of each car of a batch, refused above `most`."""
+    cars = known_cars(known_system(vehicle), dt)
     if cars is None:
         _checks.refuse("vehicle", "have numbers that are known", "traced", "Call it outside `jax.jit`.")
-    return max(step_need(*car, dt).substeps for car in cars)
+    return [step_need(*car, dt, most=most).substeps for car in cars]
 
 
 def known_system(vehicle: AbstractVehicle) -> System:
@@ -178,7 +183,7 @@ def step_need(system: System, slopes: Sequence[Slopes], dt: float, *, most: int 
     by_travel = 0.25 * dt * dt * np.array([s.stiffness for s in slopes]) * felt
     # the least n with by_rate/n + by_travel/n² <= LARGEST
     counts = 0.5 * (by_rate + np.sqrt(by_rate * by_rate + 4.0 * LARGEST * by_travel)) / LARGEST
-    counts = np.maximum(counts, dt * np.array([s.rate for s in slopes]) / HEUN)
+    counts = np.maximum(np.nan_to_num(counts, nan=np.inf), dt * np.array([s.rate for s in slopes]) / HEUN)
     count, worst = max(1, math.ceil(min(float(counts.max()), 1e9))), int(counts.argmax())
     if count > most:
         _refuse_law(system.layout.ports[worst], slopes[worst], dt, count)

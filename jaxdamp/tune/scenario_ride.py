@@ -20,7 +20,7 @@ from jaxdamp._types import Point, Scalar
 from jaxdamp.metrics import Metric, MetricValues
 from jaxdamp.parameters import checked, get, match_paths, modules_inside, replace, with_values
 from jaxdamp.roads import WhiteRoad
-from jaxdamp.simulation import Ride, moves_axles, refuse_without_stationary_motion
+from jaxdamp.simulation import Designs, Ride, moves_axles, refuse_without_stationary_motion
 from jaxdamp.tune.settings import Run
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 Values: TypeAlias = Float[Array, " scenarios"]
 Risk: TypeAlias = Callable[[Values, Values], Scalar]  # of the values and their weights, which add up to one
 T = TypeVar("T")
+K = TypeVar("K")
 
 
 def mean(values: Values, weights: Values) -> Scalar:
@@ -138,7 +139,7 @@ class ScenarioRide(eqx.Module):
 
     def reaching(self, columns: Mapping[str, np.ndarray]) -> "ScenarioRide":
         """The same with as many substeps as the steepest of these values need, if they were not asked for."""
-        return eqx.tree_at(lambda scenarios: scenarios.ride, self, self.ride.reaching(columns))
+        return eqx.tree_at(lambda scenarios: scenarios.ride, self, self.ride.reaching(columns, self._designs()))
 
     def of_vehicle(self, vehicle: AbstractVehicle) -> "ScenarioRide":
         """The same scenarios for another vehicle."""
@@ -146,7 +147,10 @@ class ScenarioRide(eqx.Module):
 
     def out_of_domain(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
         """Why the vehicle cannot have the values of each of many points: a text, empty where it can."""
-        return self.ride.out_of_domain(columns)
+        return self.ride.out_of_domain(columns, self._designs())
+
+    def _designs(self) -> Designs[str]:
+        return _in_all(functools.partial(replace, self.vehicle), self.factors, self.offsets, self.ride.dt)
 
     def each(self, point: Point | None = None) -> dict[str, Float[Array, " scenarios"]]:
         """The metrics by name in every scenario, with other values of the parameters at these paths."""
@@ -196,6 +200,38 @@ def _in(vehicle: AbstractVehicle, factors: dict[str, Array], offsets: dict[str, 
     return _changed(vehicle, {path: (factors[path], offsets[path]) for path in factors})
 
 
+def _in_all(
+    build: Callable[[dict[K, Scalar | float]], AbstractVehicle],
+    factors: dict[str, Array],
+    offsets: dict[str, Array],
+    dt: float,
+) -> Designs[K]:
+    """The designs of a vehicle in all scenarios."""
+    if not factors:
+        return Designs(build, dt)
+    return Designs(
+        lambda numbers: eqx.filter_vmap(_in, in_axes=(None, 0, 0))(build(numbers), factors, offsets), dt, True
+    )
+
+
+def designs_under(
+    conditions: Sequence["Condition"],
+    vehicle: AbstractVehicle,
+    build: Callable[[dict[K, Scalar | float]], AbstractVehicle],
+    dt: float,
+) -> Designs[K]:
+    """The designs of a vehicle under all of these conditions, for steps of dt [s]."""
+    return _in_all(build, *_stacked(_changes(vehicle, conditions)), dt)
+
+
+def _stacked(changes: Mapping[str, Sequence[tuple[Array, Array]]]) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Factors and offsets by path, with an axis for the scenarios in front."""
+    factors, offsets = (
+        {path: jnp.stack([pair[i] for pair in pairs]) for path, pairs in changes.items()} for i in (0, 1)
+    )
+    return factors, offsets
+
+
 def _in_each(scenarios: ScenarioRide, vehicle: AbstractVehicle) -> dict[str, Float[Array, " scenarios"]]:
     """The metrics of a vehicle by name in every scenario."""
     one = functools.partial(_in_one, scenarios, vehicle)
@@ -221,12 +257,12 @@ def scenario_ride(
     common = eqx.tree_at(
         lambda r: (r.vehicle, r.road), first, (vehicle, inputs[0] if white else None), is_leaf=lambda leaf: leaf is None
     )
-    stacked = {path: [jnp.stack(side) for side in zip(*pairs, strict=True)] for path, pairs in changes.items()}
+    factors, offsets = _stacked(changes)
     ride = ScenarioRide(
         ride=common.side_by_side(),
         roads=jax.tree.map(lambda *leaves: jnp.stack(leaves), *inputs),
-        factors={path: factors for path, (factors, _) in stacked.items()},
-        offsets={path: offsets for path, (_, offsets) in stacked.items()},
+        factors=factors,
+        offsets=offsets,
         weights=jnp.asarray([scenario.weight for scenario in scenarios]),
         names=tuple(scenario.name for scenario in scenarios),
         delays_axles=not white and any(ride.road is not None for ride in rides),

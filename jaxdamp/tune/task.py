@@ -13,11 +13,13 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._pieces import piece
 from jaxdamp._settings import part
+from jaxdamp._types import Scalar
 from jaxdamp.dampers import RangeUse, has_fitted_range
 from jaxdamp.metrics import Metric, current_name
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import (
     DEVIATIONS,
+    MOST,
     CoarseStepWarning,
     Exponential,
     Ride,
@@ -25,8 +27,6 @@ from jaxdamp.simulation import (
     over_runs,
     range_sentences,
     stationary_notes,
-    steepest,
-    substeps_needed,
 )
 from jaxdamp.solve import Evaluation, Region
 from jaxdamp.tune.limits import Limit, LimitRange, limit_ends, limit_ranges, scaled, span_from
@@ -34,7 +34,7 @@ from jaxdamp.tune.measuring import BatchProgram, Computed, Measurement
 from jaxdamp.tune.objective import Function, Targets, goal_limits, goal_objective, objective_of
 from jaxdamp.tune.ranges import SearchRange, search_range, start_points
 from jaxdamp.tune.result import V
-from jaxdamp.tune.scenario_ride import in_condition, worst
+from jaxdamp.tune.scenario_ride import designs_under, in_condition, worst
 from jaxdamp.tune.scenarios import Condition, Road, Scenario, Scenarios
 from jaxdamp.tune.settings import LEAST, RUN, Run, Settings
 from jaxdamp.tune.shape import ShapeNumbers
@@ -63,8 +63,8 @@ def step_notes(start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable
     return notes
 
 
-def stepped_for_choices(run: Run, space: SearchRange) -> Run:
-    """The run with as many substeps as the steepest of the choices needs.
+def stepped_for_choices(run: Run, space: SearchRange, vehicle: AbstractVehicle, road: Road | Scenarios) -> Run:
+    """The run with as many substeps as the steepest of the choices needs, in every scenario.
 
     A search takes the substeps that its start needs, and its steps are small; a choice may be far from there.
     """
@@ -72,15 +72,17 @@ def stepped_for_choices(run: Run, space: SearchRange) -> Run:
     if not space.is_choice.any() or not isinstance(engine, Exponential) or engine.substeps is not None:
         return run
 
-    def design(numbers: dict[int, float]) -> AbstractVehicle:
+    def design(numbers: dict[int, Scalar | float]) -> AbstractVehicle:
         values = space.start.copy()
         values[list(numbers)] = list(numbers.values())
         return space.free.build(jnp.asarray(values, space.free.values.dtype))
 
     choices = {i: choice.values for i, choice in enumerate(space.choices) if choice is not None}
     dt = run["dt"] or engine.spacing or USUAL_STEP
-    count = steepest(design, choices, dt)
-    more = count > substeps_needed(design({}), dt)
+    conditions = {id(s.condition): s.condition for s in road.scenarios} if isinstance(road, Scenarios) else {}
+    designs = designs_under(list(conditions.values()), vehicle, design, dt)
+    count = min(designs.steepest(choices), MOST)
+    more = count > designs.needed({})
     return {**run, "engine": dataclasses.replace(engine, substeps=count)} if more else run
 
 
@@ -159,7 +161,7 @@ class DesignTask(Generic[V]):
         self.space = search_range(vehicle, settings["over"], settings["freeze"], settings["bounds"], settings["tie"])
         self.tolerance = DOUBLE if self.space.free.values.dtype == np.float64 else SINGLE
         if not white:
-            self.run = stepped_for_choices(self.run, self.space)
+            self.run = stepped_for_choices(self.run, self.space, vehicle, road)
         worst_case = len(objectives) == 1 and isinstance(road, Scenarios) and road.risk is worst
         of_each = dict.fromkeys([*self.allowed, *self.objective.names * worst_case])
         self.measured = Measurement(

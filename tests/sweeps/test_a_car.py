@@ -85,6 +85,16 @@ def test_the_steepest_end_of_the_axes_sets_the_steps_of_a_sweep():
     assert ["too steep" in reason for reason in fixed.out_of_domain({"damper.rate": rate})] == [False, True]
 
 
+def test_combinations_that_no_step_can_follow_fail_where_each_value_alone_could():
+    """Their travel was a number without meaning."""
+    car, road, (name,) = vehicles.presets.quarter_car_000(), roads.step(0.02, start=0.05), ["working_space_rms"]
+    ride = jaxdamp.Ride(car, road, metrics=[name], duration=0.1, dt=2e-3)
+    axes = {"damper.rate": [1500.0, 2.4e6], "unsprung_mass": [1.0, 40.0]}
+    with pytest.warns(UserWarning, match="with these values together a law is too steep for 64 steps in 0.002 s"):
+        data = jaxdamp.sweep(ride, axes)
+    assert data["failed"].values.tolist() == [[False, False], [True, False]]
+
+
 def test_a_ride_takes_one_number_for_each_parameter():
     ride = jaxdamp.Ride(vehicles.presets.quarter_car_000(), roads.step(0.02, start=0.05), duration=0.1)
     with pytest.raises(ValueError, match=r"point\['rate'\]` must be one number for one car, .*`jaxdamp\.sweep"):

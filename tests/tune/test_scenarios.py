@@ -156,12 +156,16 @@ def test_a_slope_is_balanced_by_weights_that_are_not_negative() -> None:
 
 def test_a_sweep_over_scenarios_takes_the_steps_of_its_steepest_end() -> None:
     """With those of the start, the travel of stiff dampers at coarse steps was no number."""
-    bump = roads.step(0.02, start=0.05)
-    scenarios = tune.Scenarios([bump], [tune.Condition(), tune.Condition(factors={"sprung_mass": 1.2})], risk="worst")
+    bump, light = roads.step(0.02, start=0.05), {"unsprung_mass": 30.0}
+    scenarios = tune.Scenarios([bump], [tune.Condition(light), tune.Condition(factors={"sprung_mass": 1.2})])
     run: dict[str, Any] = {"metrics": ["working_space_rms"], "duration": 0.3, "dt": 2e-3}
-    data = sweep(scenarios.ride(LINEAR, **run), {"damper.rate": [1500.0, 200e3]})
-    alone = scenarios.ride(parameters.replace(LINEAR, {"damper.rate": 200e3}), **run)()
-    assert float(data["working_space_rms"][1]) == pytest.approx(float(alone["working_space_rms"]), rel=1e-9)
+    ride, rates = scenarios.ride(LINEAR, **run), {"damper.rate": np.array([1500.0, 200e3, 9e5])}
+    data = sweep(ride, {"damper.rate": rates["damper.rate"][:2]})
+    alone = scenarios.ride(parameters.replace(LINEAR, {"damper.rate": 200e3}), **run)
+    assert ride.reaching({"damper.rate": rates["damper.rate"][:2]}).ride.substeps == alone.ride.substeps
+    assert float(data["working_space_rms"][1]) == pytest.approx(float(alone()["working_space_rms"]), rel=1e-9)
+    steepest = Ride(parameters.replace(LINEAR, light), bump, **run)
+    np.testing.assert_array_equal(ride.out_of_domain(rates) == "", steepest.out_of_domain(rates) == "")
 
 
 def test_white_roads_without_a_stationary_motion_are_refused_after_one_computation(monkeypatch) -> None:
