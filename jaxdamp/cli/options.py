@@ -19,7 +19,7 @@ from typing import Annotated, NamedTuple
 
 import typer
 
-from jaxdamp import _unit_registry
+from jaxdamp import _checks, _unit_registry
 from jaxdamp.cli import offers
 from jaxdamp.cli.offers import Written
 from jaxdamp.cli.signatures import REQUIRED, Argument, Arguments, arguments, options_class
@@ -189,6 +189,8 @@ def number_in(unit: str) -> Callable[[str], float]:
                 return float(number) * factor
         raise typer.BadParameter(f"{text!r} is neither a number in {unit} nor one with a unit, such as {example}.")
 
+    if unit not in OTHER_UNITS:
+        _checks.refuse("unit", f"be one of {', '.join(OTHER_UNITS)}", unit, "Add an example of it to `OTHER_UNITS`.")
     example = OTHER_UNITS[unit]
     return read
 

@@ -18,6 +18,7 @@ from jaxdamp._jacobian import with_jacobian
 from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table, plain
+from jaxdamp._traced import depends
 from jaxdamp._types import Figure
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, keeps_conditions, laws_inside, without_fitted_ranges
@@ -141,8 +142,12 @@ def numbers_of(
 ) -> Callable[[Array], PyTree]:
     """A user's function of a model as one of its free numbers, which returns arrays in the user's structure.
 
-    By derivatives, truths and counts that are computed are refused: their derivatives are zero, their errors are not.
+    By derivatives, truths and counts that depend on the model are refused: their derivatives are zero, their errors are
+    not.
     """
+
+    def counts(values: Array) -> list[Array]:
+        return _counts(jax.tree.leaves(function(model(values))))
 
     def of(values: Array) -> PyTree:
         result = function(model(values))
@@ -150,13 +155,18 @@ def numbers_of(
         if not leaves or not all(eqx.is_array_like(leaf) and not jnp.iscomplexobj(leaf) for leaf in leaves):
             remedy = "Return a number, an array, or a dict or other pytree of them."
             _checks.refuse("function", "return real numbers", _checks.described(result), remedy)
-        for kind in {str(leaf.dtype) for leaf in leaves if isinstance(leaf, Tracer)} if by_derivatives else ():
-            if not jnp.issubdtype(kind, jnp.inexact):
+        if by_derivatives and (counted := _counts(leaves)):
+            if depends(counts, np.zeros(values.shape, values.dtype)):
                 must, remedy = "return numbers that have derivatives", "Give `samples=1000`, or return what it is from."
-                _checks.refuse("function", must, f"one that returns {kind}", remedy)
+                _checks.refuse("function", must, f"one that returns {counted[0].dtype}", remedy)
         return jax.tree.map(lambda leaf: jnp.asarray(leaf, float), result)
 
     return of
+
+
+def _counts(leaves: Sequence[PyTree]) -> list[Array]:
+    """Whole numbers and truths among results; JAX traces also those that depend on nothing."""
+    return [leaf for leaf in leaves if isinstance(leaf, Tracer) and not jnp.issubdtype(leaf.dtype, jnp.inexact)]
 
 
 def over_samples(of: Callable[[Array], PyTree], samples: Array, value: PyTree | None = None) -> Propagated:

@@ -202,3 +202,8 @@ def test_what_the_command_line_says_otherwise_is_still_said_by_the_library():
     ]
     said = "\n".join(plain + filled)
     assert not [call for call in CALLS if not call.startswith(COMPOSED) and not re.search(call, said)]
+
+
+def test_an_option_in_a_unit_without_an_example_says_what_to_add():
+    with pytest.raises(ValueError, match=r"`unit` must be one of m/s, s, Hz, N, but is mm.*`OTHER_UNITS`"):
+        options.number_in("mm")

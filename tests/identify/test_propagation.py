@@ -87,6 +87,14 @@ def test_truths_and_counts_have_no_derivatives_but_samples(bilinear):
         assert bilinear.propagate(of, samples=50).standard_error > 0.0
 
 
+@pytest.mark.parametrize("samples", [None, 20])
+def test_whole_numbers_that_depend_on_nothing_are_results_without_error(bilinear, samples):
+    """JAX traces them too, if `jnp` makes them."""
+    found = bilinear.propagate(lambda law: (law.rebound_rate, jnp.arange(3), jnp.asarray(True), 7), samples=samples)
+    assert found.standard_error[0] > 0.0 and found.value[1].tolist() == [0, 1, 2] and found.value[2:] == (1, 7)
+    assert not np.any(found.standard_error[1]) and found.standard_error[2] == 0.0
+
+
 def test_samples_of_knots_are_in_their_order(bilinear):
     """Of the normal distribution, six in ten are not."""
     law = PiecewiseLinear(np.array([-0.05, -0.02, 0.02, 0.05]), np.array([800.0, 2500.0, 4000.0, 1500.0, 900.0]))
