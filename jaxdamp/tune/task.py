@@ -42,6 +42,7 @@ from jaxdamp.vehicles import AbstractVehicle
 
 
 USUAL_STEP = 1e-3  # s, of a run that names none
+UNLIKE_START = "The tuned vehicle is not simulated like the start"
 
 
 def step_notes(start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable[[AbstractVehicle], Ride]) -> list[str]:
@@ -53,7 +54,7 @@ def step_notes(start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable
         try:
             needed = ride_of(tuned).substeps
         except ValueError as error:
-            return [f"The tuned vehicle is not simulated like the start: {error}"]
+            return [f"{UNLIKE_START}: {error}"]
     notes = [str(warning.message) for warning in caught]
     if needed > taken:
         notes.append(
@@ -212,7 +213,9 @@ class DesignTask(Generic[V]):
         notes = stationary_notes(design, road) if isinstance(road, WhiteRoad) else []
         coarse = [[] if white else step_notes(self.vehicle, design, ride_of) for ride_of in rides]
         notes += dict.fromkeys(note for of_ride in coarse for note in of_ride)
-        sound = [on for on, bad in zip(rides, coarse, strict=True) if not any("does not bear" in note for note in bad)]
+        sound = [
+            on for on, bad in zip(rides, coarse, strict=True) if not any(note.startswith(UNLIKE_START) for note in bad)
+        ]
         uses = {}
         for when, vehicle in (("At the start", self.vehicle), ("After the tuning", design)):
             sentences, uses = outside_ranges(vehicle, sound)

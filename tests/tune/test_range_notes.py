@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import dampers, roads, tune, vehicles
+from jaxdamp.simulation import Exponential
 from jaxdamp.vehicles import linearise, stationary_rms
 
 
@@ -41,6 +42,16 @@ def test_on_a_driven_road_the_run_itself_is_looked_at():
         times = float(re.findall(r"\(([\d.e+]+) times\)", note)[0])
         assert times == pytest.approx(metrics["peak_damper_velocity"] / 0.02, rel=0.05)
     assert start.startswith("At the start, damper:") and after.startswith("After the tuning, damper:")
+
+
+def test_a_tuned_damper_that_the_given_steps_do_not_bear_is_noted_and_its_range_left_out():
+    """The search was lost at its end, by the refusal of the run that looks at the range."""
+    law = dampers.with_fitted_range(dampers.Linear(30e3), velocity=(-0.02, 0.02))
+    car, road = vehicles.presets.quarter_car_000(law), roads.cosine_bump(0.05, start=0.1, duration=0.25)
+    run: dict[str, Any] = {"duration": 0.5, "dt": 5e-3, "engine": Exponential(substeps=1)}
+    result = tune.minimise("travel", car, road, over={"damper.rate": (1000.0, 9e4)}, **run)
+    assert "must keep every law stable, but is 1" in result.warnings[-1]
+    assert not any("fitted to" in note for note in result.warnings)
 
 
 def test_the_motion_in_each_condition_is_looked_at():
