@@ -18,7 +18,7 @@ from jaxtyping import Array, Float
 from jaxdamp._jacobian import with_jacobian
 from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._status import Status
-from jaxdamp._triangles import triangle
+from jaxdamp._triangles import orthonormal, triangle
 from jaxdamp.dampers import laws_inside, margins
 from jaxdamp.identify.printed import Evaluator, evaluator, evaluators
 from jaxdamp.identify.problem import Problem, linearised
@@ -55,6 +55,10 @@ class SearchEnd(NamedTuple):
     def finite(self) -> bool:
         """Whether the sum of squares and the derivatives are finite."""
         return bool(np.isfinite(self.squares) and np.all(np.isfinite(self.jacobian)))
+
+
+NEAR_END = 0.01  # in coordinates, within which a number that presses against an end of its range belongs on it
+SETTLED = 1e-3  # of the residual, which the other numbers may still take off, where a search is at its minimum
 
 
 class Here(NamedTuple):
@@ -205,9 +209,35 @@ def _search_unbounded(problem: Problem, max_steps: int, solver: Solver) -> Searc
         status = Status.STEP_LIMIT
     else:
         status = Status.NO_STEP
-    steps = int(solution.stats["num_steps"])
-    whole = np.concatenate([end.whole, problem.anchor_rows(end.values)])
+    end, settled = _at_pressed_ends(problem, np.asarray(y), end)
+    status = Status.CONVERGED if settled else status
+    steps, whole = int(solution.stats["num_steps"]), _whole(problem, end)
     return SearchEnd(end.values, whole[:, -1], whole[:, :-1], status, steps)
+
+
+def _at_pressed_ends(problem: Problem, y: Float[np.ndarray, " free"], end: Here) -> tuple[Here, bool]:
+    """The end of a search with the numbers that press against an end of their range on it, if that is no worse.
+
+    The coordinates without bounds approach such an end only slowly, and a search stops before it. Also whether some do,
+    and the others are where the derivatives place the minimum.
+    """
+    rows, (lower, upper) = _whole(problem, end), problem.coordinates.bounds()
+    slope = end.units.T @ (rows[:, :-1].T @ rows[:, -1])
+    at = np.where((y - lower < NEAR_END) & (slope > 0.0), lower, y)
+    at = np.where((upper - y < NEAR_END) & (slope < 0.0), upper, at)
+    if np.array_equal(at, y):
+        return end, False
+    there = _by_xla(problem, problem.coordinates, jnp.asarray(at, problem.free.values.dtype))
+    rows_there = _whole(problem, there)
+    missed = np.linalg.norm(rows_there[:, -1])
+    if not (missed <= np.linalg.norm(rows[:, -1]) and np.all(there.margins > 0.0)):
+        return end, False
+    left = orthonormal((rows_there[:, :-1] @ there.units)[:, at == y]).T @ rows_there[:, -1]
+    return there, bool(np.linalg.norm(left) <= SETTLED * missed)
+
+
+def _whole(problem: Problem, here: Here) -> Float[np.ndarray, "samples columns"]:
+    return np.concatenate([here.whole, problem.anchor_rows(here.values)])
 
 
 class _Residual(eqx.Module):

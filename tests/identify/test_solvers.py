@@ -60,6 +60,15 @@ def test_orders_and_bounds_hold_by_construction(sines):
     assert np.all(np.diff(result.law.knots) > 0.0)
 
 
+def test_a_number_that_presses_against_its_bound_is_on_it(sines):
+    """The search stopped before it after its largest number of steps, or ended where the fit was called no minimum."""
+    start, runs = dampers.Bilinear(3800.0, 1500.0), sines(dampers.Bilinear(4000.0, 1600.0), noise=20.0)
+    how: dict[str, Any] = {"bounds": {"rebound_rate": (1000.0, 3900.0)}, "starts": 1}
+    usual, other = (identify.fit(start, runs, solver=s, **how) for s in (None, optx.LevenbergMarquardt(**HOW)))
+    assert other.status is identify.Status.CONVERGED and other["rebound_rate"].note == "at a bound"
+    assert apart(usual, other) < 0.1
+
+
 @pytest.fixture
 def unchecked():
     """Annotations are not checked, as in a user's program."""
