@@ -132,7 +132,7 @@ def _parts(table: RawTable, time: Samples | None, motion: Samples, rate: float |
         return parts
     good = [part for part in parts if _has_cycle(part, motion)]
     if not good:
-        clock.refuse_gaps(time, clock.gaps(time), where, table.place)
+        clock.refuse_cuts(time, where, table.place)
     left_out = [part for part in parts if part not in good]
     samples = sum(len(part.time) for part in left_out)
     plural = "s" if len(left_out) > 1 else ""

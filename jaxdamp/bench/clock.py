@@ -99,6 +99,45 @@ def gaps(time: Samples) -> np.ndarray:
     return np.flatnonzero(wide)
 
 
+def rate_changes(time: Samples) -> np.ndarray:
+    """Numbers of the samples behind which the clock runs at another rate, steadily before and behind."""
+    count = FEWEST
+    if len(time) <= 2 * count or is_uniform(time):
+        return np.empty(0, dtype=int)
+    middle = np.arange(count, len(time) - count)
+    before, behind = ((time[middle + a] - time[middle + b]) / count for a, b in ((0, -count), (count, 0)))
+    places = middle[np.abs(np.log(behind / before)) > np.log(_OTHER_RATE)]
+    off = np.array([max(_off(time[i - count : i + 1]), _off(time[i : i + count + 1])) for i in places])
+    steady = off < _STEADY
+    groups = np.split(places[steady], np.flatnonzero(np.diff(places[steady]) > count) + 1)
+    offs = np.split(off[steady], np.flatnonzero(np.diff(places[steady]) > count) + 1)
+    return np.array([group[np.argmin(each)] - 1 for group, each in zip(groups, offs, strict=True) if group.size], int)
+
+
+def _cuts(time: Samples) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of the samples behind which time jumps, and of those behind which its rate changes."""
+    changes = rate_changes(time)
+    stretches = itertools.pairwise([0, *(changes + 1), len(time)])
+    return np.concatenate([start + gaps(time[start:stop]) for start, stop in stretches]), changes
+
+
+def refuse_cuts(time: Samples, where: str, place: Place) -> NoReturn:
+    """Refuse a record that cannot be cut at its gaps and changes of its rate."""
+    missing, changes = _cuts(time)
+    if missing.size:
+        refuse_gaps(time, missing, where, place)
+    i = int(changes[0]) + 1
+    before, behind = (FEWEST / (time[i + a] - time[i + b]) for a, b in ((0, -FEWEST), (FEWEST, 0)))
+    said = f"the sampling rate changes from {before:.4g} to {behind:.4g} Hz ({changes.size} such changes in all)"
+    _refuse_clock(f"{where}, {place(i)}: {said}. Cut the record there")
+
+
+def _off(time: Samples) -> float:
+    """The largest distance of instants from a uniform grid, in steps."""
+    step, off = _grid(time)
+    return off / step
+
+
 def refuse_gaps(time: Samples, missing: np.ndarray, where: str, place: Place = IN_ARRAYS) -> NoReturn:
     """Refuse a record with samples missing behind these."""
     i, steps = int(missing[0]) + 1, np.diff(time)
@@ -157,6 +196,8 @@ def check_count(count: int, where: str) -> None:
         )
 
 
+_OTHER_RATE = 1.2  # ratio of steps beyond which the clock runs at another rate, if it is steady before and behind
+_STEADY = 0.25  # of a step, by which a steady clock is off: rounded instants are
 _EPOCH = 1e8  # seconds: a larger time counts from 1970, not from the start of the record
 _MOST_PARTS = 20
 
@@ -177,20 +218,22 @@ class Part:
 
 
 def regular_parts(time: Samples, where: str, place: Place = IN_ARRAYS) -> list[Part]:
-    """The stretches of a record between gaps in time, each on uniform instants."""
+    """The stretches of a record between gaps in time and changes of its rate, each on uniform instants."""
     notes: tuple[str, ...] = ()
     if abs(time[0]) > _EPOCH:
         notes = (f"time counts from the first sample, which the file puts at {time[0]:.3f} s",)
         time = time - time[0]
     check_order(time, where, place)
-    missing = gaps(time)
-    if len(missing) >= _MOST_PARTS:
-        refuse_gaps(time, missing, where, place)
-    edges = [0, *(int(gap) + 1 for gap in missing), len(time)]
+    missing, changes = _cuts(time)
+    if len(missing) + len(changes) >= _MOST_PARTS:
+        refuse_cuts(time, where, place)
+    edges = [0, *(np.sort(np.concatenate([missing, changes])) + 1).tolist(), len(time)]
+    kinds = {"gaps in time": missing.size, "changes of the sampling rate": changes.size}
+    between = " and ".join(kind for kind, count in kinds.items() if count)
     parts = []
     for number, (start, stop) in enumerate(itertools.pairwise(edges), 1):
-        cut = f"part {number} of {len(missing) + 1} between gaps in time, {time[start]:.6g} to {time[stop - 1]:.6g} s"
-        parts.append(_part(time, slice(start, stop), (*notes, cut) if len(missing) else notes))
+        cut = f"part {number} of {len(edges) - 1} between {between}, {time[start]:.6g} to {time[stop - 1]:.6g} s"
+        parts.append(_part(time, slice(start, stop), (*notes, cut) if between else notes))
     return parts
 
 

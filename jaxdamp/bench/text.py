@@ -1,5 +1,6 @@
 """Text files with columns of numbers: delimiter, decimal sign, preamble, header, footer."""
 
+import codecs
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -64,6 +65,7 @@ def read_text(file: Path, delimiter: str | None = None) -> list[RawTable]:
         raise ValueError(f"{file} is empty: export it from the bench again.")
     _check_width(file, top)
     layout = _choose(file, top, delimiter)
+    lines, top = _without_empty_end(lines, top, layout)
     rows = [(n, split(line, layout.delimiter)) for n, line in top]
     header = header_of(rows, layout)
     if header is None:
@@ -80,6 +82,19 @@ def read_text(file: Path, delimiter: str | None = None) -> list[RawTable]:
         table = _table(file, lines[: block.end], block.first, layout, header)
         tables.append(replace(table, preamble=preamble, record=title(preamble, block, block.header, layout)))
     return named_apart(tables, "")
+
+
+def _without_empty_end(
+    lines: list[str], top: list[tuple[int, str]], layout: Layout
+) -> tuple[list[str], list[tuple[int, str]]]:
+    """The lines, without the last name where all rows of numbers leave the last column empty, as unused channels do."""
+    rows = [(line, split(line, layout.delimiter)) for _, line in top]
+    numbers = [line for line, cells in rows if layout.values_in(cells)]
+    if layout.delimiter == " " or not all(line.rstrip(" ").endswith(layout.delimiter) for line in numbers):
+        return lines, top
+    wide = [line for line, cells in rows if len(cells) == layout.count + 1 and not any(map(layout.has_value, cells))]
+    shorter = {line: line[: line.rindex(layout.delimiter)] for line in wide}
+    return [shorter.get(line, line) for line in lines], [(n, shorter.get(line, line)) for n, line in top]
 
 
 def _check_commas(file: Path, rows: Rows, header: Header, layout: Layout) -> None:
@@ -121,8 +136,8 @@ def text_lines(file: Path) -> list[str]:
     """The lines of a text file in UTF-8, UTF-16 or the Western code page of Windows."""
     check_size(file, file.stat().st_size)
     raw = file.read_bytes()
-    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return _with_minus(raw.decode("utf-16", errors="replace")).splitlines()
+    if encoding := _wide_encoding(raw):
+        return _with_minus(raw.decode(encoding, errors="replace")).splitlines()
     other = next((name for begin, name in _CONTENT.items() if raw.startswith(begin)), None)
     if other or b"\0" in raw[:4096]:
         kind = f"it looks like {other}: give it that ending" if other else "its format is unknown"
@@ -131,6 +146,16 @@ def text_lines(file: Path) -> list[str]:
         return _with_minus(raw.decode("utf-8-sig")).splitlines()
     except UnicodeDecodeError:
         return raw.decode("cp1252", errors="replace").splitlines()
+
+
+def _wide_encoding(raw: bytes) -> str | None:
+    """UTF-16 by its mark, or by the zeros of Western text where there is no mark."""
+    if raw[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+        return "utf-16"
+    low, high = raw[:4096:2], raw[1:4096:2]
+    if high.count(0) > 0.9 * len(high) and not low.count(0):
+        return "utf-16-le"
+    return "utf-16-be" if low.count(0) > 0.9 * len(low) and not high.count(0) else None
 
 
 def _with_minus(text: str) -> str:

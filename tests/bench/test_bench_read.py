@@ -148,6 +148,27 @@ def test_a_record_with_gaps_is_cut_into_parts(write):
     assert any("1 part without a full cycle left out, 100 samples" in note for note in runs[1].notes)
 
 
+@pytest.mark.parametrize("rate", [24.0, 100.0, 700.0])
+def test_a_record_whose_rate_changes_is_cut_there(tmp_path, rate):
+    """It was resampled at a mean rate, as if its clock jittered by hundreds of steps, or refused for gaps."""
+
+    def written(*times):
+        time = np.concatenate(times)
+        rows = [f"{t:.4f},{20 * np.sin(9 * t)},{500 * np.cos(9 * t)}" for t in time]
+        (tmp_path / "run.csv").write_text("\n".join(["t_s,x_mm,F_N", *rows]))
+        return tmp_path / "run.csv"
+
+    first, other = np.arange(900) / 300, 3.0 + np.arange(int(4 * rate)) / rate
+    runs = read(written(first, other))
+    assert runs.names == ("run_part1", "run_part2") and [len(run) for run in runs] == [900, len(other)]
+    assert [run.sampling_rate for run in runs] == pytest.approx([300.0, rate], rel=1e-4)
+    for run in runs:
+        np.testing.assert_allclose(run.force, 500 * np.cos(9 * run.time), atol=0.5)
+    assert any("part 2 of 2 between changes of the sampling rate, 3 to " in note for note in runs[1].notes)
+    with pytest.raises(ValueError, match=r"line 62: the sampling rate changes from 299.9 to 600.6 Hz \(1 such change"):
+        read(written(first[:60], 0.2 + np.arange(30) / 600))
+
+
 def test_bad_words_are_refused_before_a_file_is_opened():
     with pytest.raises(ValueError, match=r"`sign`.*Did you mean 'compression-positive'"):
         read("nowhere.csv", sign="compression positive")

@@ -43,7 +43,9 @@ def odd() -> Iterator[tuple[str, bytes]]:
             if delimiter != " ":
                 header = delimiter.join(names["rows"]) + "\n" + delimiter.join(("s", "mm", "N"))
                 yield f"{delimiter!r} {decimal} row of units", text(header, delimiter, decimal)
-    for encoding, end in product(("utf-8", "utf-8-sig", "utf-16", "cp1252"), ("\n", "\r\n", "\r")):
+    for encoding, end in product(
+        ("utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "cp1252"), ("\n", "\r\n", "\r")
+    ):
         yield f"{encoding} {end!r}", text("Zeit [s],Däm-Weg [mm],F [N]", encoding=encoding, end=end)
     for form in ("{:.9e}", "{:+.6f}", "{:12.6f}", '"{:.6f}"', "{:.6f} ", "{:.9E}"):
         yield f"form {form}", text(form=form)
@@ -54,6 +56,10 @@ def odd() -> Iterator[tuple[str, bytes]]:
     yield "comments", text(edit=lambda lines: ["# made by hand", "# of wood", *lines])
     yield "blank lines", text(edit=lambda lines: ["", *lines[:50], "", "   ", *lines[50:], "", ""])
     yield "trailing delimiters", text("t_s,x_mm,F_N,", edit=lambda lines: [lines[0], *(n + "," for n in lines[1:])])
+    for header in ("t_s,x_mm,F_N,T_degC", "t,x,F,T\ns,mm,N,degC"):
+        count = header.count("\n") + 1
+        named = text(header, edit=lambda lines, n=count: [*lines[:n], *(row + "," for row in lines[n:])])
+        yield f"an unused last channel, {count} lines of header", named
     yield "footer", text(edit=lambda lines: [*lines, "end of record", "checksum 4711"])
     yield "a footer of the same width", text(edit=lambda lines: [*lines, "end,of,record"])
     yield (
@@ -108,6 +114,15 @@ def bad() -> Iterator[tuple[str, bytes, str]]:
     yield "one column", text("F_N", columns=(F,)), "only one column of numbers"
     yield "no header", text(edit=lambda lines: lines[1:]), r"no header row.*columns=\{\"time\": 0"
     yield "short", text(edit=lambda lines: lines[:13]), "only 12 samples, too few"
+    yield (
+        "no stroke",
+        text(
+            "t_s,x_mm,F_N",
+            form="{:.6f}",
+            edit=lambda lines: [*lines[:1], *(f"{n.split(',')[0]},,{n.split(',')[2]}" for n in lines[1:])],
+        ),
+        r"column 'x_mm' \(stroke\) is empty",
+    )
     for number in (2, 3, 120, 241):
         yield (
             f"text in line {number}",
