@@ -1,8 +1,11 @@
 """The searches of `minimise`: descents, and how far from an optimum they ended; or every combination of choices."""
 
+import contextlib
+import dataclasses
 import functools
 import itertools
 import math
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, final
 
@@ -12,12 +15,14 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp.parameters import checked
+from jaxdamp.simulation import AbstractEngine, CoarseStepWarning, Exponential, Ride
 from jaxdamp.solve import Evaluation, Scaling, SearchState, SequentialQuadratic
 from jaxdamp.tune.combinations import Combinations
 from jaxdamp.tune.limits import Limit, LimitEnd, limit_ends
-from jaxdamp.tune.measuring import LANES
+from jaxdamp.tune.measuring import LANES, ride_on
 from jaxdamp.tune.ranges import MOST_COMBINATIONS
-from jaxdamp.tune.task import DesignTask, Evaluator, Tolerance
+from jaxdamp.tune.scenario_ride import ScenarioRide
+from jaxdamp.tune.task import DesignTask, Evaluator, Tolerance, is_white
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -189,6 +194,26 @@ def _is_allowed(task: DesignTask[AbstractVehicle], point: Sequence[float]) -> bo
     except ValueError:
         return False
     return True
+
+
+def finer(
+    task: DesignTask[AbstractVehicle], designs: Sequence[np.ndarray], asked: AbstractEngine | None
+) -> Exponential | None:
+    """The engine with the substeps that designs need, if the search took fewer and nobody asked for so many."""
+    engine = Exponential() if asked is None else asked
+    if is_white(task.road) or not isinstance(engine, Exponential) or engine.substeps is not None:
+        return None
+    taken = needs = _substeps(task.measured.ride)
+    for values in designs:
+        design = task.space.free.build(jnp.asarray(values, task.space.free.values.dtype))
+        with warnings.catch_warnings(), contextlib.suppress(ValueError):  # of the result, as notes on it say
+            warnings.simplefilter("ignore", CoarseStepWarning)
+            needs = max(needs, _substeps(ride_on(design, task.road, task.objective, {**task.run, "engine": asked})))
+    return dataclasses.replace(engine, substeps=needs) if needs > taken else None
+
+
+def _substeps(ride: Ride | ScenarioRide) -> int:
+    return ride.ride.substeps if isinstance(ride, ScenarioRide) else ride.substeps
 
 
 def rank(task: DesignTask[AbstractVehicle], ended: Ended, limits: Sequence[Limit]) -> tuple[float, float]:

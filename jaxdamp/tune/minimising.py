@@ -2,7 +2,6 @@
 
 import dataclasses
 import itertools
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Unpack
 
@@ -15,10 +14,9 @@ from jaxdamp._settings import with_defaults
 from jaxdamp._status import Status
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, MetricValues
-from jaxdamp.simulation import AbstractEngine, CoarseStepWarning, Exponential
 from jaxdamp.solve import Evaluation
 from jaxdamp.tune.combinations import Combinations, beside_next
-from jaxdamp.tune.descending import Descent, Driven, Ended, every_combination, missed, rank, reached
+from jaxdamp.tune.descending import Descent, Driven, Ended, every_combination, finer, missed, rank, reached
 from jaxdamp.tune.limits import Limit, LimitRange, decided, in_each, lost_limits
 from jaxdamp.tune.measuring import ride_on
 from jaxdamp.tune.objective import Function, check_objective
@@ -121,7 +119,7 @@ def minimise(
     with Progress("Tuning") as shown:
         progress = progress or (lambda step, value: shown(f"step {step}, {name} {value:.5g}"))
         searched = _searched(task, settings, progress)
-        while engine := _finer(task, searched.best.values, settings["engine"]):  # by fewer substeps than it needs
+        while engine := finer(task, [searched.best.values], settings["engine"]):  # by fewer substeps than it needs
             task = DesignTask([metric], vehicle, road, argument="metric", settings={**settings, "engine": engine})
             searched = _searched(task, settings, progress)
         evaluator, descent, starts, evaluations, limits, several, ended = searched
@@ -171,22 +169,6 @@ def _searched(
     descent = combining or Descent(evaluator, settings["max_steps"], progress)
     several = descent.search(starts, evaluations, limits)
     return _Searched(evaluator, descent, starts, evaluations, limits, several, _best(descent, several, limits))
-
-
-def _finer(task: DesignTask[AbstractVehicle], values: np.ndarray, asked: AbstractEngine | None) -> Exponential | None:
-    """The engine with the substeps that a design needs, if the search took fewer and nobody asked for so many."""
-    engine = Exponential() if asked is None else asked
-    if is_white(task.road) or not isinstance(engine, Exponential) or engine.substeps is not None:
-        return None
-    design = task.space.free.build(jnp.asarray(values, task.space.free.values.dtype))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", CoarseStepWarning)  # of the result
-        try:
-            rides = task.measured.ride, ride_on(design, task.road, task.objective, {**task.run, "engine": asked})
-        except ValueError:  # no step can follow it, as a note on the result says
-            return None
-    taken, needs = (ride.ride.substeps if isinstance(ride, ScenarioRide) else ride.substeps for ride in rides)
-    return dataclasses.replace(engine, substeps=needs) if needs > taken else None
 
 
 def _beside_next(evaluator: Evaluator, combinations: Combinations, fresh_roads: int) -> Combinations:

@@ -14,7 +14,7 @@ from jaxdamp._status import Status
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, current_name
 from jaxdamp.solve import SearchState
-from jaxdamp.tune.descending import missed
+from jaxdamp.tune.descending import finer, missed
 from jaxdamp.tune.front import FrontParameter, ParetoFront, non_dominated, shares_of
 from jaxdamp.tune.limits import Limit
 from jaxdamp.tune.measuring import LANES, ride_on
@@ -89,7 +89,25 @@ def pareto(
     [4660.0, 5540.0]
     """
     _check(objectives, vehicle, road, points, settings | {"points": points, "between": between})
-    task = DesignTask(objectives, vehicle, road, argument="objectives", settings=settings)
+    engine, front = settings["engine"], None
+    with Progress("Tracing the front") as shown:
+        report = progress or (lambda done, total: shown(f"{done} of {total} points"))
+        while front is None or engine:  # again where points need more substeps than were taken
+            task = DesignTask(objectives, vehicle, road, argument="objectives", settings={**settings, "engine": engine})
+            front = _front(task, points, between, reference, report, settings)
+            engine = finer(task, [front.designs[i] for i in _looked_at(front)], settings["engine"])
+    return front
+
+
+def _front(
+    task: DesignTask[V],
+    points: int,
+    between: int,
+    reference: Mapping[str, float] | None,
+    report: Callable[[int, int], None],
+    settings: Settings,
+) -> ParetoFront[V]:
+    """The front of a task, judged."""
     names, space, evaluator = task.objective.names, task.space, Evaluator(task, LANES)
     given = _reference(reference, names)
     if space.is_choice.any():
@@ -100,16 +118,8 @@ def pareto(
     usable = [i for i, one in enumerate(evaluations) if i == 0 or all(np.all(np.isfinite(a)) for a in one)]
     before = task.numbers(evaluations[0].values)
     size = evaluator.sizes(evaluations[0])
-    with Progress("Tracing the front") as shown:
-
-        def report(done: int, total: int) -> None:
-            if progress is not None:
-                progress(done, total)
-            else:
-                shown(f"{done} of {total} points, {evaluator.program.points} designs simulated")
-
-        problem = FrontProblem(evaluator, limits, settings["max_steps"], size, report)
-        states = trace_front(problem, starts[usable], [evaluations[i] for i in usable], points)
+    problem = FrontProblem(evaluator, limits, settings["max_steps"], size, report)
+    states = trace_front(problem, starts[usable], [evaluations[i] for i in usable], points)
     chosen, status, notes = _judged(states, problem)
     designs = np.array([np.clip(state.y * space.unit, space.lower, space.upper) for state in chosen])
     numbers = dict(zip(task.names, np.array([state.evaluation.values for state in chosen]).T, strict=True))
@@ -120,7 +130,7 @@ def pareto(
     worst = {name: float(numbers[name].max() + BEYOND * np.ptp(numbers[name])) for name in names}
     fresh, start_on_fresh = _on_fresh_roads(evaluator, designs, settings["fresh_roads"])
     front = ParetoFront[V](
-        start=vehicle,
+        start=task.vehicle,
         names=names,
         values=_of_metrics(task, numbers),
         before=_of_metrics(task, before),
@@ -248,9 +258,14 @@ def _notes_on_points(
                     f"{places}, up to {furthest:.4g}."
                 )
     by_point: dict[str, None] = {}
-    for i in dict.fromkeys([0, front.knee, len(front) - 1]):
+    for i in _looked_at(front):
         by_point |= dict.fromkeys(f"Point {i}: {note}" for note in task.notes_on_runs(front.point(i))[0])
     return [*notes, *by_point]
+
+
+def _looked_at(front: ParetoFront) -> list[int]:
+    """The ends and the knee of a front."""
+    return list(dict.fromkeys([0, front.knee, len(front) - 1]))
 
 
 def _with_designs_between(

@@ -239,6 +239,17 @@ def test_simulated_front_is_better_than_a_grid():
     assert front.hypervolume > 0.9 * tune.hypervolume(grid, reference)
 
 
+def test_a_front_is_driven_with_the_substeps_that_its_ends_need():
+    """Its points were by the one step of the start, with the advice to tune again."""
+    bump = roads.cosine_bump(0.05, start=0.1, duration=0.25)
+    run: dict[str, Any] = {"duration": 0.5, "dt": 5e-3}
+    front = tune.pareto([TRAVEL, COMFORT], CAR, bump, over={"damper.rate": (1000.0, 40000.0)}, points=3, **run)
+    stiff = front.point(0)
+    alone = jaxdamp.Ride(stiff, bump, **run)
+    assert alone.substeps > 1 and not any("tune again" in note for note in front.warnings)
+    assert front.values[TRAVEL][0] == pytest.approx(float(alone()[TRAVEL]), rel=1e-6)
+
+
 @pytest.mark.slow
 def test_a_front_of_a_peak_has_no_design_that_another_valley_beats():
     """Rebound rates near 2500 and 7000 N s/m are valleys of their own; a search stays in the one it begins in."""
