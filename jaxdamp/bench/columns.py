@@ -229,35 +229,6 @@ def column_of(table: RawTable, role: str, index: int, choice: Choice) -> Column:
             return Column(role, index, header, None)
         _refuse_text(f"{where} ({role})", np.asarray(column.values))
     name, written = split_header(column.name)
-    unit = column.unit or written
-    if role in choice.gains:
-        return unit is None or conversion(role, unit) is None
-    if column.is_text:
-        return False
-    return (conversion(role, unit) if unit else tail_unit(name, role)) is not None
-
-
-def _is_clock(column: RawColumn) -> bool:
-    """Whether a column of text holds times of day."""
-    texts = np.asarray(column.values)[:3]
-    return len(texts) > 0 and all(":" in str(text) and is_stamp(str(text)) for text in texts)
-
-
-def column_of(table: RawTable, role: str, index: int, choice: Choice) -> Column:
-    """The column of this number as a quantity, with the unit that the header or the caller names."""
-    column, header = table.columns[index], table.names[index]
-    where = f"{table.where}, column {header!r}"
-    if column.is_text:
-        if role == "time":
-            return Column(role, index, header, None)
-        text = str(np.asarray(column.values)[0])
-        if not any(map(str, np.asarray(column.values))):
-            raise ArgumentError(
-                f"{where} ({role}) is empty: name another column, or export the record with its values."
-            )
-        how = f": {PLAINLY}" if GROUPED.fullmatch(text) else ""
-        raise ArgumentError(f"{where} ({role}) holds text ({text!r}), not numbers{how}.")
-    name, written = split_header(column.name)
     tail = None if column.unit or written else tail_unit(name, role)
     stated = column.unit or written or ""
     if role in choice.gains:
