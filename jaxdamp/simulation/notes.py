@@ -192,6 +192,48 @@ def commands_at_limits(
     return tuple(texts)
 
 
+COUNTED_LATE, AIM = 0.005, 0.0025  # relative errors of an RMS: from which on one is said, and that of the step advised
+
+
+def jumps_counted_late(
+    system: System,
+    dt: float,
+    every: int,
+    commands: Float[np.ndarray, "time commands"],
+    channel: Callable[[str], Signal],
+) -> tuple[str, ...]:
+    """The acceleration whose RMS misses most as it is counted just before each jump of a command, where that shows.
+
+    Between a sample before a jump and one after it counts the mean of both squares; the value after it is continued
+    from the two instants that follow.
+
+    Arguments:
+        system: the vehicle with its controller.
+        dt: spacing of the instants [s].
+        every: of how many instants of the run one is saved; nothing is said of a run that saved only some.
+        commands: of the dampers, then the demanded forces [N].
+        channel: the values of a channel by its name.
+    """
+    control: ControlLoop = system.control
+    if every > 1 or float(control.actuator_lag) > 0.0 or control.rate_limit is not None or len(commands) < 4:
+        return ()
+    jumps = np.flatnonzero(np.any(np.diff(commands[:-1, : len(control.ports)], axis=0) != 0.0, axis=1))
+    errors = {}
+    for name in (c.name for c in system.layout.channels if c.kind is ChannelKind.ACCELERATION):
+        values = np.asarray(channel(name), float)
+        after = 2.0 * values[jumps + 1] - values[jumps + 2]
+        errors[name] = float(0.25 * np.sum(values[jumps] ** 2 - after**2) / max(np.sum(values**2), 1e-300))
+    name, error = max(errors.items(), key=lambda pair: abs(pair[1]), default=("", 0.0))
+    if abs(error) < COUNTED_LATE:
+        return ()
+    parts = next((n for n in (2, 5, 10, 20, 50) if n * AIM >= abs(error)), 100)  # of a step: samples stay at instants
+    return (
+        f"The commands jump, as the actuators have no lag, and channels are those just before each jump: the RMS of "
+        f"`{name}` is about {100.0 * abs(error):.2g} % too {'large' if error > 0 else 'small'} for that. Pass "
+        f"`dt={dt / parts:g}`, or the `actuator_lag` that the valve has.",
+    )
+
+
 def far_outside(uses: Mapping[str, Sequence[RangeUse]]) -> list[str]:
     """By how much each damper leaves the range of its law, where it does so for 1 % of the time or more.
 

@@ -26,6 +26,7 @@ from jaxdamp.simulation.notes import (
     Delivery,
     commands_at_limits,
     deliveries,
+    jumps_counted_late,
     range_sentences,
     range_uses,
     tyres_in_tension,
@@ -137,7 +138,7 @@ class Response(eqx.Module, AbstractResult):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Tyres that pulled, dampers beyond the fitted range of their laws, commands at their limits, or no motion.
+        """Tyres that pulled, dampers beyond the fitted range of their laws, commands at limits or that jump, no motion.
 
         Empty while JAX traces.
         """
@@ -146,7 +147,8 @@ class Response(eqx.Module, AbstractResult):
         tyres = tyres_in_tension(self.system, np.asarray(self.time), self.__getitem__)
         limits = ()
         if self.commands is not None:
-            limits = commands_at_limits(self.system, self.dt, self.every, np.asarray(self.commands))
+            run = self.system, self.dt, self.every, np.asarray(self.commands)
+            limits = (*commands_at_limits(*run), *jumps_counted_late(*run, self.__getitem__))
         still = without_motion(np.asarray(self.motion), np.asarray(self.road))
         return (*still, *tyres, *range_sentences(self.range_use()), *limits)
 

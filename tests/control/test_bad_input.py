@@ -1,11 +1,23 @@
 """What a controller cannot do is refused or said, by names, values and remedies."""
 
+import re
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from jaxdamp import Ride, roads, simulate
-from jaxdamp.control import AbstractPolicy, Controlled, RateLimit, Sensors, SignalSensor, Skyhook, StateFeedback, lqr
+from jaxdamp.control import (
+    AbstractPolicy,
+    AccelerationDriven,
+    Controlled,
+    RateLimit,
+    Sensors,
+    SignalSensor,
+    Skyhook,
+    StateFeedback,
+    lqr,
+)
 from jaxdamp.dampers import Bilinear, Linear, PiecewiseLinear, Scheduled
 from jaxdamp.parameters import replace
 from jaxdamp.vehicles import Corner, ForceDriven, Guided, HalfCar, QuarterCar
@@ -43,6 +55,21 @@ def test_a_vehicle_that_diverges_by_itself_does_not_blame_the_policy():
     car = Controlled(QUARTER, StateFeedback(velocity=1.0))
     with pytest.raises(ValueError, match="`vehicle` must have a finite response"):
         simulate(car, ROAD, duration=0.5, start={"z_sprung": 1e308})
+
+
+def test_an_rms_that_counts_jumps_of_the_command_late_is_said():
+    """By how much, beside a run with a tenth of the step on the same road."""
+    for policy, most in ((Skyhook(1e9), 0.02), (AccelerationDriven(), -0.02)):
+        coarse, fine = (simulate(Controlled(QUARTER, policy), ROAD, duration=1.0, dt=dt) for dt in (1e-3, 1e-4))
+        rms = [float(np.std(np.asarray(run["sprung_acceleration"]))) for run in (coarse, fine)]
+        missed = rms[0] / rms[1] - 1.0
+        assert 0.005 < missed / np.sign(most) < 0.02
+        (note,) = [note for note in coarse.notes if "jump" in note]
+        said = float(re.findall(r"about ([\d.]+) % too", note)[0])
+        assert said == pytest.approx(100.0 * abs(missed), rel=0.4) and ("large" in note) == (most > 0.0)
+        assert not any("jump" in note for note in fine.notes)
+    lagging = Controlled(QUARTER, Skyhook(1e9), actuator_lag=5e-3)
+    assert not any("jump" in note for note in simulate(lagging, ROAD, duration=1.0).notes)
 
 
 def test_commands_that_stay_at_a_limit_are_said():
