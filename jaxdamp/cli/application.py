@@ -53,7 +53,16 @@ class Command(TyperCommand):
             if option == "--units" and "--show-units" in names and "=" not in (value or following):
                 known = "--show-units"
             replaced.append(f"{known}{equals}{value}")
+        self._refuse_repeated(ctx, replaced)
         return super().parse_args(ctx, replaced)
+
+    def _refuse_repeated(self, ctx: "Context", words: list[str]) -> None:
+        """Refuse an option of one value that is given several times, of which only the last would count."""
+        *_, order = self.make_parser(ctx).parse_args(args=[*words])
+        for option in order:
+            several = option.param_type_name == "argument" or getattr(option, "multiple", False)
+            if not several and not getattr(option, "is_flag", False) and (count := order.count(option)) > 1:
+                ctx.fail(f"Option {option.opts[0]} must be given once, but is given {count} times.")
 
 
 class Commands(TyperGroup):

@@ -241,6 +241,7 @@ def test_a_sign_that_contradicts_the_work_is_refused(lab_file: Path, tmp_path: P
         (("--sampling-rate", "77"), "--columns time=none leaves out the column"),
         (("--held-out", "20mm_*"), "Option --held-out: No record is called '20mm_*'"),
         (("--held-out", "10mm_*"), "leaves no record to fit"),
+        (("--loss", "huber", "--loss=soft_l1"), "Option --loss must be given once, but is given 2 times"),
     ],
 )
 def test_wrong_options_are_refused(records: Path, tmp_path: Path, words: tuple[str, str], message: str) -> None:
