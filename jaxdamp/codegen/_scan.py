@@ -85,6 +85,7 @@ class _Scan:
         if any(laned[2]):
             reason = "A printed loop has one table of rows for all points, and here each point has its own."
             raise NotImplementedError(f"{reason} Leave `printed` out: XLA then compiles the loop.")
+        traced, start = jax.tree.map(jnp.asarray, (traced, start))  # of literals JAX hands plain numbers on
         loop = self.loop((laned[0], laned[1]), traced, start, rows)
         start = [
             jnp.broadcast_to(value, (size, *value.shape)) if lane and not had else value

@@ -14,6 +14,7 @@ from jaxdamp import Ride, roads, simulate, simulation, vehicles
 from jaxdamp.control import (
     AbstractPolicy,
     AccelerationDriven,
+    BandSkyhook,
     Controlled,
     Groundhook,
     PowerDriven,
@@ -48,6 +49,16 @@ def ride(car):
 @pytest.fixture(scope="module")
 def response(car):
     return simulate(car, ROAD, duration=2.0)
+
+
+def test_the_numbers_of_a_policy_with_a_filter_are_swept():
+    """Its states, which begin at zero, were no arrays to the loop that is printed as C, and the sweep failed."""
+    axes = {"policy.low": [0.1, 1.0], "policy.high": [5.0]}
+    ride = Ride(Controlled(quarter(), BandSkyhook(3000.0)), ROAD, metrics=METRICS[:1], duration=0.5)
+    data = jaxdamp.sweep(ride, axes)
+    for low in axes["policy.low"]:
+        alone = ride({"policy.low": low, "policy.high": 5.0})[METRICS[0]]
+        assert float(data[METRICS[0]].sel({"policy.low": low})[0]) == pytest.approx(float(alone), rel=1e-9)
 
 
 def test_simulation_ride_sweep_and_printed_loop_give_the_same_numbers(car, ride, response):
