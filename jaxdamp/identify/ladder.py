@@ -113,6 +113,7 @@ NAMED_LAWS = {
 LAWS = tuple(name for name, law in NAMED_LAWS.items() if not law.optional)
 CURVES = ("bilinear", "besinger", "piecewise_linear")  # tried on all records
 LAGGING, RUBBING = ("besinger_lag", "besinger_series_spring"), ("lugre_spring", "series_spring_dahl")
+KNEES = 2  # on each side, of the curve in series_spring_dahl: of three the records of measured dampers show at most two
 RECOVERY = 0.02  # s, short: from 0.3 s fits of records without thinning end at worse minima
 BINS = 30  # of the velocity, in which the halves of a stroke are compared
 LOOP = 2e-3  # share of the squared force that is hysteresis, above which records show a loop
@@ -231,7 +232,7 @@ def _start(name: str, runs: Sequence[BenchRun]) -> AbstractDamper:
     if name in _BESIDE_SPRING:
         return _BESIDE_SPRING[name](velocity, force) + Spring.guess(velocity, force, stroke)
     if name == "series_spring_dahl":
-        curve, friction = PiecewiseLinear.guess(velocity, force), Dahl.guess(velocity, 0.2 * force)
+        curve, friction = PiecewiseLinear.guess(velocity, force, KNEES), Dahl.guess(velocity, 0.2 * force)
         spring = Spring.guess(velocity, force, stroke)
         return SeriesSpring(curve, _stiffness(curve, lag_time(runs), velocity)) + friction + spring
     law, lag = Besinger.guess(velocity, force), lag_time(runs)

@@ -120,8 +120,9 @@ def reduced(rungs: Sequence[Rung], fitted: Fitted, progress: Callable[[str], Non
 
     Parts with undetermined numbers are left out one after the other, while the error on motion held out stays within
     2 % of that of the whole law, and within 10 % of the smallest. The recommended law is tried first, then, if doubt
-    remains, the one with the smallest error; a law without doubt that is only within the 10 % is the last resort. Where
-    a law without doubt would be recommended, one that predicts better by more than these 2 % is tried.
+    remains, the one with the smallest error. If doubt remains in both, it is a law without doubt that is only within
+    the 10 %, or else, of those within the 2 %, the one with the fewest numbers in doubt. Where a law without doubt
+    would be recommended, one that predicts better by more than these 2 % is tried.
 
     `ahead` begins, beside a fit, the one that follows if this one does not predict as well; None where it cannot.
     """
@@ -135,16 +136,27 @@ def reduced(rungs: Sequence[Rung], fitted: Fitted, progress: Callable[[str], Non
     for source in sources[:MOST_LAWS]:
         progress(source.name)
         as_well = max(min(near, LOSS * source.error), floor)
-        rung = _without_doubt(source, as_well, max(near, floor) if best.doubt else as_well, fitted, ahead)
-        found += [rung] if rung else []
-        if rung and rung.error <= as_well:
+        found += _without_doubt(source, as_well, max(near, floor) if best.doubt else as_well, fitted, ahead)
+        if found and _by_doubt(found[-1]) <= (0, as_well):
             break
-    yield from sorted(found, key=lambda rung: rung.error)[:1]
+    yield from sorted(found, key=_by_doubt)[:1]
 
 
-def _without_doubt(source: Rung, enough: float, most: float, fitted: Fitted, ahead: Ahead) -> Rung | None:
-    """The law with less in it, all of whose numbers are determined, if one predicts as well or nearly as well."""
-    at, left_out, failed, nearly = source, list[str](), set[str](), None
+def _without_doubt(source: Rung, enough: float, most: float, fitted: Fitted, ahead: Ahead) -> list[Rung]:
+    """The law with less in it, all of whose numbers are determined, if one predicts as well or nearly as well.
+
+    Otherwise that with the fewest numbers in doubt of those that predict as well, if they are fewer than the whole law
+    has.
+    """
+    tried = list(_with_less(source, enough, fitted, ahead))
+    sound = [rung for rung in tried if not rung.doubt and rung.error <= most]
+    clearer = [rung for rung in tried if rung.error <= enough and _in_doubt(rung) < _in_doubt(source)]
+    return sorted(sound or clearer, key=_by_doubt)[:1]
+
+
+def _with_less(source: Rung, enough: float, fitted: Fitted, ahead: Ahead) -> Iterator[Rung]:
+    """The law without one part after the other, as long as it predicts as well, and those tried that do not."""
+    at, left_out, failed = source, list[str](), set[str]()
     begun: dict[tuple[str, ...], Begun | None] = {}  # by what is left out
     while at.doubt and len(failed) < MOST_FAILURES:
         law, weak, fastest = _doubtful(at)
@@ -156,8 +168,8 @@ def _without_doubt(source: Rung, enough: float, most: float, fitted: Fitted, ahe
                 begun[following] = begun.get(following) or ahead(source, *_with_held(other.law, fastest))
             known, (law, held) = begun.get((*left_out, part.words)), _with_held(part.law, fastest)
             rung = _as_reduced(source, known() if known else fitted(source, law, held), held)
-            if rung and not rung.doubt and rung.error <= most:
-                nearly, most = rung, rung.error
+            if rung:
+                yield rung
             if rung and rung.error <= enough:
                 at, left_out = rung, [*left_out, part.words]
             else:
@@ -166,7 +178,15 @@ def _without_doubt(source: Rung, enough: float, most: float, fitted: Fitted, ahe
             at, left_out, failed = source, [], {*failed, left_out[0]}  # another way
         else:
             break
-    return nearly
+
+
+def _in_doubt(rung: Rung) -> int:
+    """How many of its numbers are in doubt; a fit that did not converge counts as one more."""
+    return len(_doubtful(rung)[1]) + (not rung.result.converged)
+
+
+def _by_doubt(rung: Rung) -> tuple[int, float]:
+    return _in_doubt(rung), rung.error
 
 
 def _as_reduced(source: Rung, rung: Rung | Failure, held: tuple[str, ...]) -> Rung | None:

@@ -1,5 +1,7 @@
 """A recommended law whose numbers would be in doubt: made simpler from one of the laws."""
 
+import dataclasses
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -25,7 +27,7 @@ from jaxdamp.dampers import (
 from jaxdamp.export import from_json, to_json
 from jaxdamp.identify import compare
 from jaxdamp.identify.reducing import held_of, reduced, simpler_laws, without_zero_terms
-from jaxdamp.identify.rungs import recommendation
+from jaxdamp.identify.rungs import recommendation, why
 from jaxdamp.parameters import parameters
 from jaxdamp.rig import quasi_static
 from tests.dampers.test_contract import LAWS
@@ -185,6 +187,27 @@ def test_a_law_left_aside_for_its_doubt_is_made_simpler_where_it_predicts_better
         return list(reduced([near, whole], lambda source, law, held: simpler, lambda name: None, nothing_ahead))
 
     assert [rung.name for rung in recommended(1.05)] == ["friction_lag_reduced"] and recommended(1.01) == []
+
+
+def test_without_a_law_free_of_doubt_the_one_with_the_least_is_listed(comparison):
+    """If it predicts as well as the whole law, in whose place it is recommended, and the verdict says so."""
+    _, whole, simpler = comparison.rungs
+    note = next(e.note for e in whole.result.parameters if e.note)
+    lag = [e._replace(note=note * e.name.endswith("lag_time")) for e in simpler.result.parameters]
+    doubtful = simpler._replace(result=dataclasses.replace(simpler.result, parameters=tuple(lag)), reduced="")
+    others = [rung._replace(held_out_rmse=1.5 * whole.error) for rung in comparison.rungs if not rung.doubt][:1]
+
+    def fitted(source, law, held):
+        return doubtful if isinstance(law, Lag) and isinstance(law.law, Linear) else whole._replace(held_out_rmse=1e3)
+
+    (taken,) = reduced([*others, whole], fitted, lambda name: None, nothing_ahead)
+    assert taken.doubt == "1 not identifiable" and taken.reduced == "friction_lag reduced to Lag(Linear)"
+    choice = recommendation([*others, whole, taken])
+    assert choice.rung is taken
+    assert (
+        "it is friction_lag reduced to Lag(Linear), which predicts as well"
+        in why(choice, [whole, taken], made=taken.reduced)[0]
+    )
 
 
 @pytest.mark.slow
