@@ -28,6 +28,10 @@ def whole(target: Path) -> Iterator[Path]:
         yield draft
         sync(draft)
         os.replace(draft, target)
+    except OSError as error:
+        if error.filename == str(draft):  # a name that nobody gave
+            error.filename = str(target)
+        raise
     finally:
         draft.unlink(missing_ok=True)
 

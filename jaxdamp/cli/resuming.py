@@ -142,13 +142,21 @@ def _described(command: str, given: Mapping[str, object]) -> dict[str, dict[str,
     files |= {folder / "jaxdamp.toml" for folder in {Path.cwd(), *(file.parent for file in files)}}
     for value in options.values():
         files |= {Path(str(part)).expanduser() for part in (value if isinstance(value, list) else [value])}
-    sums = {f"{file}": sha256(file)[:16] for file in sorted(files) if file.is_file()}
+    sums = {f"{file}": _sum(file) for file in sorted(files) if file.is_file()}
     versions = {name: version(name) for name in ("jaxdamp", "jax", "numpy")} | {"Python": sys.version.split()[0]}
     return {"command": {"the command": command}, "options": words, "files": sums, "versions": versions}
 
 
 def _in_words(value: object) -> str:
     return " ".join(map(str, value)) if isinstance(value, list) else str(value)
+
+
+def _sum(file: Path) -> str:
+    """A short sum of a file, or that it has none: what reads it says so, or leaves it out."""
+    try:
+        return sha256(file)[:16]
+    except OSError as error:
+        return f"not opened ({error.strerror})"
 
 
 def sha256(file: Path) -> str:

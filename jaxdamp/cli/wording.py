@@ -134,4 +134,6 @@ def _setting(found: re.Match[str]) -> str:
 
 def message(error: Exception) -> str:
     """What an error says, in the language of the command line."""
+    if isinstance(error, OSError) and error.filename is not None and error.strerror:
+        return f"{str(error.filename)!r} cannot be opened ({error.strerror}): look at its rights, or name another one."
     return in_command_line(in_options(str(error), error.settings if isinstance(error, ArgumentError) else ()))

@@ -3,6 +3,7 @@ import json
 import re
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -310,3 +311,21 @@ def test_a_manifest_gains_and_files_left_out(tmp_path: Path, runs: BenchSet) -> 
     assert f"read as the manifest {tmp_path / 'bench.toml'} says (all records)" in said
     assert f"left out: {folder / 'broken.csv'} holds no rows of numbers" in said
     assert len(_rows(tmp_path / "fit" / "tables" / "records.csv")) == 3
+
+
+def test_a_file_that_cannot_be_opened_is_left_out_like_others(
+    lab_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also while its sum is noted for --resume."""
+    (tmp_path / "locked.csv").write_text(lab_file.read_text())
+    opened = Path.open
+
+    def locked(path: Path, *words: Any, **options: Any) -> Any:
+        if path.name == "locked.csv":
+            raise PermissionError(13, "Permission denied", str(path))
+        return opened(path, *words, **options)
+
+    monkeypatch.setattr(Path, "open", locked)
+    words = "fit", tmp_path, "--sign", "compression-positive", "--law", "linear", "--out", tmp_path / "out"
+    assert "locked.csv' cannot be opened (Permission denied)" in refused(tmp_path, *words)
+    assert "left out" in jaxdamp(*words, "--skip-bad").output

@@ -139,3 +139,8 @@ def test_any_name_of_a_law_becomes_a_name_of_c(law: Path) -> None:
     law.rename(law.parent / "2 Dämpfer.json")
     assert "_2_D_mpfer_test.c" in jaxdamp("export", "2 Dämpfer.json", "--to", "c").output
     assert "Option --file must be" in refused(law.parent, "export", "2 Dämpfer.json", "--to", "c", "--file", "2.c")
+
+
+def test_a_file_that_cannot_be_written_is_named_as_it_was_given(law: Path) -> None:
+    said = refused(law.parent, "export", law, "--to", "csv", "--file", "a" * 300 + ".csv")
+    assert "a.csv' cannot be opened (File name too long)" in said and "draft" not in said
