@@ -9,6 +9,7 @@ from typing import NoReturn
 
 import numpy as np
 from jaxtyping import ArrayLike, Float
+from numpy.lib.stride_tricks import sliding_window_view
 
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
@@ -107,7 +108,14 @@ def rate_changes(time: Samples) -> np.ndarray:
     middle = np.arange(count, len(time) - count)
     before, behind = ((time[middle + a] - time[middle + b]) / count for a, b in ((0, -count), (count, 0)))
     places = middle[np.abs(np.log(behind / before)) > np.log(_OTHER_RATE)]
-    off = np.array([max(_off(time[i - count : i + 1]), _off(time[i : i + count + 1])) for i in places])
+    windows, number = sliding_window_view(time, count + 1), np.arange(count + 1) - count / 2
+
+    def off_grid(first: np.ndarray) -> np.ndarray:
+        inside = windows[first] - windows[first].mean(axis=1, keepdims=True)
+        step = inside @ number / (number @ number)
+        return np.max(np.abs(inside - step[:, None] * number), axis=1) / step
+
+    off = np.maximum(off_grid(places - count), off_grid(places))
     steady = off < _STEADY
     groups = np.split(places[steady], np.flatnonzero(np.diff(places[steady]) > count) + 1)
     offs = np.split(off[steady], np.flatnonzero(np.diff(places[steady]) > count) + 1)
@@ -130,12 +138,6 @@ def refuse_cuts(time: Samples, where: str, place: Place) -> NoReturn:
     before, behind = (FEWEST / (time[i + a] - time[i + b]) for a, b in ((0, -FEWEST), (FEWEST, 0)))
     said = f"the sampling rate changes from {before:.4g} to {behind:.4g} Hz ({changes.size} such changes in all)"
     _refuse_clock(f"{where}, {place(i)}: {said}. Cut the record there")
-
-
-def _off(time: Samples) -> float:
-    """The largest distance of instants from a uniform grid, in steps."""
-    step, off = _grid(time)
-    return off / step
 
 
 def refuse_gaps(time: Samples, missing: np.ndarray, where: str, place: Place = IN_ARRAYS) -> NoReturn:

@@ -34,14 +34,14 @@ class Designs(Generic[K]):
     dt: float
     several: bool = False
 
-    def needed(self, numbers: Mapping[K, float]) -> float:
+    def needed(self, numbers: Mapping[K, float | int]) -> float | int:
         """The substeps that a design needs, however many; infinite for what no vehicle can be."""
         try:
             return max(self._counts(self.build(dict(numbers)), self.several))
         except ValueError:
             return np.inf
 
-    def steepest(self, values: Mapping[K, Iterable[float]]) -> int:
+    def steepest(self, values: Mapping[K, Iterable[float | int]]) -> int:
         """The most substeps that a combination of values needs, however many; 1 without any.
 
         Values that no step can follow where all other numbers are those of the vehicle are left out.
@@ -85,7 +85,7 @@ def steepest_between(designs: Designs[str], vehicle: AbstractVehicle, columns: M
 
 
 def can_follow(
-    designs: Designs[str], vehicle: AbstractVehicle, name: str, column: np.ndarray, most: float = MOST
+    designs: Designs[str], vehicle: AbstractVehicle, name: str, column: np.ndarray, most: float | int = MOST
 ) -> np.ndarray:
     """For which values of one parameter a vehicle needs at most so many substeps.
 
