@@ -136,22 +136,22 @@ def reduced(rungs: Sequence[Rung], fitted: Fitted, progress: Callable[[str], Non
     for source in sources[:MOST_LAWS]:
         progress(source.name)
         as_well = max(min(near, LOSS * source.error), floor)
-        found += _without_doubt(source, as_well, max(near, floor) if best.doubt else as_well, fitted, ahead)
-        if found and _by_doubt(found[-1]) <= (0, as_well):
+        found += _clearer(source, as_well, max(near, floor) if best.doubt else None, fitted, ahead)
+        if found and _by_doubt(found[-1]) <= (False, 0, as_well):
             break
     yield from sorted(found, key=_by_doubt)[:1]
 
 
-def _without_doubt(source: Rung, enough: float, most: float, fitted: Fitted, ahead: Ahead) -> list[Rung]:
-    """The law with less in it, all of whose numbers are determined, if one predicts as well or nearly as well.
+def _clearer(source: Rung, enough: float, most: float | None, fitted: Fitted, ahead: Ahead) -> list[Rung]:
+    """The law with less in it, all of whose numbers are determined, if one predicts as well, or nearly so (`most`).
 
     Otherwise that with the fewest numbers in doubt of those that predict as well, if they are fewer than the whole law
-    has.
+    has; a fit that converged goes before one that did not. Without `most` there is none.
     """
     tried = list(_with_less(source, enough, fitted, ahead))
-    sound = [rung for rung in tried if not rung.doubt and rung.error <= most]
-    clearer = [rung for rung in tried if rung.error <= enough and _in_doubt(rung) < _in_doubt(source)]
-    return sorted(sound or clearer, key=_by_doubt)[:1]
+    sound = [rung for rung in tried if not rung.doubt and rung.error <= (enough if most is None else most)]
+    fewer = [rung for rung in tried if rung.error <= enough and _doubts(rung) < _doubts(source)]
+    return sorted(sound or fewer * (most is not None), key=_by_doubt)[:1]
 
 
 def _with_less(source: Rung, enough: float, fitted: Fitted, ahead: Ahead) -> Iterator[Rung]:
@@ -180,13 +180,13 @@ def _with_less(source: Rung, enough: float, fitted: Fitted, ahead: Ahead) -> Ite
             break
 
 
-def _in_doubt(rung: Rung) -> int:
-    """How many of its numbers are in doubt; a fit that did not converge counts as one more."""
-    return len(_doubtful(rung)[1]) + (not rung.result.converged)
+def _doubts(rung: Rung) -> tuple[bool, int]:
+    """Whether its fit did not converge, and how many numbers of law and machine are in doubt."""
+    return not rung.result.converged, sum(bool(e.note) for e in rung.result.parameters)
 
 
-def _by_doubt(rung: Rung) -> tuple[int, float]:
-    return _in_doubt(rung), rung.error
+def _by_doubt(rung: Rung) -> tuple[bool, int, float]:
+    return *_doubts(rung), rung.error
 
 
 def _as_reduced(source: Rung, rung: Rung | Failure, held: tuple[str, ...]) -> Rung | None:

@@ -212,7 +212,8 @@ def why(choice: Recommendation[R], rungs: Sequence[R], kind: str = "law", made: 
     if best.doubt:
         words += f"; of its numbers, {best.doubt}, and no {kind} without such doubt comes near"
     if made:
-        words += f"; it is {made}, {'which predicts as well' if best.doubt else 'what these records determine of it'}"
+        part = "with fewer numbers in doubt" if best.doubt else "what these records determine of it"
+        words += f"; it is {made}, {part}"
     aside = ", ".join(f"{rung.name} ({rung.doubt})" for rung in choice.doubted)
     return [words + f"; left aside: {aside}" * bool(aside) + "."]
 

@@ -25,7 +25,7 @@ from jaxdamp.dampers import (
     not_identified,
 )
 from jaxdamp.export import from_json, to_json
-from jaxdamp.identify import compare
+from jaxdamp.identify import Status, compare
 from jaxdamp.identify.reducing import held_of, reduced, simpler_laws, without_zero_terms
 from jaxdamp.identify.rungs import recommendation, why
 from jaxdamp.parameters import parameters
@@ -205,9 +205,17 @@ def test_without_a_law_free_of_doubt_the_one_with_the_least_is_listed(comparison
     choice = recommendation([*others, whole, taken])
     assert choice.rung is taken
     assert (
-        "it is friction_lag reduced to Lag(Linear), which predicts as well"
+        "it is friction_lag reduced to Lag(Linear), with fewer numbers in doubt"
         in why(choice, [whole, taken], made=taken.reduced)[0]
     )
+    stopped = dataclasses.replace(doubtful.result, status=Status.STEP_LIMIT)
+
+    def not_to_its_end(source, law, held):
+        return fitted(source, law, held)._replace(result=stopped)
+
+    assert list(reduced([*others, whole], not_to_its_end, lambda name: None, nothing_ahead)) == []
+    near = [rung._replace(held_out_rmse=1.05 * whole.error) for rung in others]  # recommended, as it is without doubt
+    assert list(reduced([*near, whole], fitted, lambda name: None, nothing_ahead)) == []
 
 
 @pytest.mark.slow
