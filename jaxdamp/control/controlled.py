@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._quickly import compiled_quickly
+from jaxdamp._traced import behind
 from jaxdamp._types import Number, Scalar
 from jaxdamp.control.actuator import RateLimit
 from jaxdamp.control.levels import forces_both_ways, laws_at_levels, scheduled_in, takes_command
@@ -66,7 +67,7 @@ class Controlled(AbstractVehicle):
     Raises:
         ValueError: no damper that takes a command, a name of no damper, a law whose force does not change at once with
             its command, as it stands behind a lag or a series spring whose state gives it; with `blend="force"`, each
-            level has a state of its own.
+            level has a state of its own; a damper between scaled points, whose ratio belongs into its law.
 
     >>> from jaxdamp import Ride, roads
     >>> from jaxdamp.control import Skyhook
@@ -110,6 +111,7 @@ class Controlled(AbstractVehicle):
                 _checks.one_of("policy", name, forces)
                 _checks.instance(f"policy[{name!r}]", policy, AbstractPolicy, "be a policy", such)
         dampers, policy = self.commanded(list(forces))
+        _refuse_scaled(self.car.frame(), dampers)
         policy.sampled(self.period).initial_state(dampers)  # refuses what does not suit the vehicle or the period
         each = self.sensors if isinstance(self.sensors, dict) else {}
         for name in each:
@@ -157,6 +159,21 @@ class Controlled(AbstractVehicle):
     def system(self) -> System:
         """The assembled vehicle with its controller."""
         return _controlled_system(self, self.layout)
+
+
+def _refuse_scaled(frame: Frame, dampers: Sequence[str]) -> None:
+    """Refuse dampers between scaled points: signals are heights of body and wheel, whose difference is the stroke."""
+    heights = {f"z_{body.name}" for body in frame.bodies}
+    for name in dampers:
+        shares = [behind(share) for at, share in frame.extension(name).terms.items() if at in heights]
+        if any(share is None or share.ndim for share in shares):  # traced
+            continue
+        numbers = np.array(shares)
+        for end in (numbers[numbers > 0.0], numbers[numbers < 0.0]):
+            if end.size and not np.isclose(np.sum(np.abs(end)), 1.0):
+                must = "have the difference of the heights of its ends as stroke, which the controller's signals are of"
+                remedy = "Leave the points unscaled and put the ratio into its law: `dampers.MotionRatio(law, ratio)`."
+                _checks.refuse(name, must, f"one with {np.sum(np.abs(end)):g} times a height", remedy)
 
 
 def _channels(dampers: Sequence[str], layout: Layout) -> list[Channel]:

@@ -182,6 +182,11 @@ class Frame(eqx.Module):
         _checks.one_of("name", name, elements)
         return elements[name]
 
+    def extension(self, name: str) -> Point:
+        """By what the element of a name is longer than at rest, on level ground."""
+        part = next(part for key, part, _ in self._elements() if key == name)
+        return part.extension if isinstance(part, Link) else part.point
+
     def lifting(self, lifts: bool = True) -> "Frame":
         """The same parts; if `lifts`, with tyres that can all lift off."""
         if not lifts:

@@ -22,7 +22,7 @@ from jaxdamp.control import (
     StateFeedback,
 )
 from jaxdamp.dampers import AbstractDamper, Bilinear, BoucWen, Lag, Linear, LuGre, MotionRatio, Scheduled, SeriesSpring
-from jaxdamp.vehicles import Corner, HalfCar, QuarterCar, Seat, SeatMass
+from jaxdamp.vehicles import Body, Corner, Element, Frame, HalfCar, Link, QuarterCar, Seat, SeatMass, Wheel
 
 
 METRICS = ["rms_sprung_acceleration", "rms_dynamic_tyre_load"]
@@ -293,6 +293,7 @@ def test_single_precision_drives_too(car):
         (lambda: Controlled(quarter(Linear(1500.0)), Skyhook()), "`car` must have a damper with one `Scheduled` law"),
         (lambda: Controlled(quarter(Lag(DAMPER, 0.01)), Skyhook()), "`damper` must have a force that changes at once"),
         (lambda: Controlled(quarter(SPRUNG), Skyhook()), "Blend the forces of its levels"),
+        (lambda: Controlled(_lever(0.7), Skyhook()), "`damper` must have the difference .* 0.7 times"),
         (lambda: Controlled(quarter(), {"rear_damper": Skyhook()}), "`policy` must be one of 'damper'"),
         (
             lambda: Controlled(quarter(), {"damper": cast("AbstractPolicy", 3000.0)}),
@@ -316,6 +317,18 @@ def test_what_cannot_be_controlled_is_refused(make, message, tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def _lever(ratio):
+    """A quarter car whose damper has another travel than the wheel, by its points."""
+    body, wheel = Body("sprung", 400.0), Body("unsprung", 50.0)
+    rise = body.at() - wheel.at()
+    links = Link("spring", rise, 20e3), Link("", ratio * rise, elements=(Element("damper", DAMPER),))
+    return vehicles.LumpedVehicle(Frame((body, wheel), links, (Wheel("", wheel.at(), 250e3),)))
+
+
+def test_a_damper_between_points_is_controlled_as_one_of_a_car():
+    assert Controlled(_lever(1.0), Skyhook()).commanded(["damper"])[0] == ("damper",)
 
 
 def _period(period, delay=0.0):
