@@ -158,7 +158,11 @@ def on_status(best: SearchEnd, unsettled: Sequence[str], remedy: str = "") -> li
     if best.converged and not unsettled:
         return []
     if not unsettled:
-        more = "Allow more steps. " * (best.status is Status.STEP_LIMIT)
+        more = {
+            Status.STEP_LIMIT: "Allow more steps. ",
+            Status.NO_STEP: "With a `solver` of your own this happens where a number is near an end of its range: "
+            "start farther inside, or leave `solver` out. ",
+        }.get(best.status, "")
         return [f"The search did not converge: {best.status.sentence} {more}{remedy}".rstrip()]
     differ = "differs" if len(unsettled) == 1 else "differ"
     who = ", ".join(unsettled[:3]) + f" and {len(unsettled) - 3} others" * (len(unsettled) > 3)

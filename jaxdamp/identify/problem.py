@@ -244,6 +244,10 @@ class _Fixed:
     def __init__(self, problem: Problem) -> None:
         self.fields = {name: value for name, value in problem._asdict().items() if name not in NUMBERS}
 
+    def __repr__(self) -> str:
+        names = ", ".join(run.name for run in self.fields["runs"])
+        return f"<records {names}, and settings; for other forces, `jax.vmap(problem.minimum)(forces)`>"
+
     def __eq__(self, other: object) -> bool:
         return isinstance(other, _Fixed) and _same(tuple(self.fields.values()), tuple(other.fields.values()))
 

@@ -201,15 +201,16 @@ def _search_unbounded(problem: Problem, max_steps: int, solver: Solver) -> Searc
     start = jnp.asarray(coordinates.start)
     solution = optx.least_squares(residual, solver, start, max_steps=max_steps, throw=False)
     bounded = problem.coordinates
-    y = bounded.from_physical(coordinates.to_physical(solution.value))
-    end = _by_xla(problem, bounded, y)
+    # coordinates so far out that rounding puts the number on, or past, the end that a search keeps
+    y = np.clip(bounded.from_physical(np.asarray(coordinates.to_physical(solution.value))), *bounded.bounds())
+    end = _by_xla(problem, bounded, jnp.asarray(y))
     if solution.result == optx.RESULTS.successful:
         status = Status.CONVERGED
     elif solution.result == optx.RESULTS.nonlinear_max_steps_reached:
         status = Status.STEP_LIMIT
     else:
         status = Status.NO_STEP
-    end, settled = _at_pressed_ends(problem, np.asarray(y), end)
+    end, settled = _at_pressed_ends(problem, y, end)
     status = Status.CONVERGED if settled else status
     steps, whole = int(solution.stats["num_steps"]), _whole(problem, end)
     return SearchEnd(end.values, whole[:, -1], whole[:, :-1], status, steps)
@@ -223,16 +224,16 @@ def _at_pressed_ends(problem: Problem, y: Float[np.ndarray, " free"], end: Here)
     """
     rows, (lower, upper) = _whole(problem, end), problem.coordinates.bounds()
     slope = end.units.T @ (rows[:, :-1].T @ rows[:, -1])
-    at = np.where((y - lower < NEAR_END) & (slope > 0.0), lower, y)
-    at = np.where((upper - y < NEAR_END) & (slope < 0.0), upper, at)
-    if np.array_equal(at, y):
+    low, high = (y - lower < NEAR_END) & (slope > 0.0), (upper - y < NEAR_END) & (slope < 0.0)
+    pressed, at = low | high, np.where(low, lower, np.where(high, upper, y))
+    if not pressed.any():
         return end, False
     there = _by_xla(problem, problem.coordinates, jnp.asarray(at, problem.free.values.dtype))
     rows_there = _whole(problem, there)
     missed = np.linalg.norm(rows_there[:, -1])
     if not (missed <= np.linalg.norm(rows[:, -1]) and np.all(there.margins > 0.0)):
         return end, False
-    left = orthonormal((rows_there[:, :-1] @ there.units)[:, at == y]).T @ rows_there[:, -1]
+    left = orthonormal((rows_there[:, :-1] @ there.units)[:, ~pressed]).T @ rows_there[:, -1]
     return there, bool(np.linalg.norm(left) <= SETTLED * missed)
 
 

@@ -60,13 +60,28 @@ def test_orders_and_bounds_hold_by_construction(sines):
     assert np.all(np.diff(result.law.knots) > 0.0)
 
 
-def test_a_number_that_presses_against_its_bound_is_on_it(sines):
-    """The search stopped before it after its largest number of steps, or ended where the fit was called no minimum."""
+@pytest.mark.parametrize("solver", [optx.LevenbergMarquardt(**HOW), optx.GaussNewton(**HOW)], ids=["lm", "gn"])
+def test_a_number_that_presses_against_its_bound_is_on_it(sines, solver):
+    """The search stopped before it, or so far out that rounding put it on the bound: both counted as failures."""
     start, runs = dampers.Bilinear(3800.0, 1500.0), sines(dampers.Bilinear(4000.0, 1600.0), noise=20.0)
     how: dict[str, Any] = {"bounds": {"rebound_rate": (1000.0, 3900.0)}, "starts": 1}
-    usual, other = (identify.fit(start, runs, solver=s, **how) for s in (None, optx.LevenbergMarquardt(**HOW)))
+    usual, other = (identify.fit(start, runs, solver=s, **how) for s in (None, solver))
     assert other.status is identify.Status.CONVERGED and other["rebound_rate"].note == "at a bound"
     assert apart(usual, other) < 0.1
+
+
+def test_a_search_that_ends_on_a_bound_which_it_should_leave_says_so(sines):
+    start, runs = dampers.Bilinear(4009.96, 1500.0), sines(dampers.Bilinear(4000.0, 1600.0), noise=20.0)
+    how: dict[str, Any] = {"bounds": {"rebound_rate": (1000.0, 4010.0)}, "starts": 1}
+    result = identify.fit(start, runs, solver=optx.GaussNewton(**HOW), **how)
+    assert result.status is identify.Status.NO_STEP
+    assert "start farther inside, or leave `solver` out" in result.warnings[0]
+
+
+def test_a_search_that_leaves_the_domain_of_the_law_is_not_blamed_on_its_start(sines):
+    runs = sines(dampers.Linear(1500.0) + dampers.CoulombFriction(40.0, 0.02), noise=5.0)
+    result = identify.fit(BESINGER, runs, solver=optx.GaussNewton(**HOW), starts=1)
+    assert result.status is identify.Status.NO_STEP and result["transition_velocity"].value > 0.0
 
 
 @pytest.fixture
@@ -107,6 +122,8 @@ def test_a_problem_is_a_pytree_and_its_minimum_that_of_fit(sines):
     errors = np.sqrt(np.diag(result.covariance))
     assert np.max(np.abs(values - np.array([p.value for p in result.parameters])) / errors) < 1e-9
     assert stats["num_steps"] == result.steps
+    with pytest.raises(ValueError, match=r"and settings; for other forces, `jax.vmap\(problem.minimum\)\(forces\)`"):
+        jax.tree.map(lambda *both: jnp.stack(both), problem, identify.prepare(AWAY, runs[:2]))
     assert np.all(np.isnan(problem.minimum(max_steps=2)))
 
 
