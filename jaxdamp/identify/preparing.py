@@ -141,10 +141,11 @@ def begun(
     names = own_names(model)
     stated = stated_values(model, runs)
     model = with_stated(model, stated_parameters(model, fitted_to))
-    own = _per_record(model, names.find("per_record", per_record), sigma, absent, stated)
-    frozen = [*names.find("freeze", asked["freeze"]), *names.find("freeze", frozen_by(law)), *absent]
+    frozen = [*names.find("freeze", asked["freeze"]), *names.find("freeze", frozen_by(law))]
     frozen += not_chosen(model, asked["over"], "rig.", STARTS)
-    frozen += [p.path for p in parameters(model) if p.path in stated]
+    own = _per_record(model, names.find("per_record", per_record), sigma, absent, stated)
+    own = free_by_record(own, match_paths([p.path for p in parameters(model)], frozen))
+    frozen += [*absent, *(p.path for p in parameters(model) if p.path in stated)]
     limits, tied = names.find_keys("bounds", bounds), names.find_keys("tie", tie)
     free = free_parameters(spread(model, own, len(runs)), freeze=frozen, bounds=limits, tie=tied, move=True)
     _checks.finite("law", free.values)
@@ -226,6 +227,15 @@ def _per_record(
         remedy = "The value of a record that is not fitted is undetermined: leave this record out of `runs`."
         _checks.refuse("weighting", "be finite with `per_record`", "infinite for some records", remedy)
     return tuple(paths)
+
+
+def free_by_record(paths: Sequence[str], held: Collection[str]) -> tuple[str, ...]:
+    """Those with a value for each record that are not held at their start, at least one if there are any."""
+    free = tuple(path for path in paths if path not in held)
+    if paths and not free:
+        remedy = "Remove it from `freeze`, or name it in `over`."
+        _checks.refuse("per_record", "name parameters that are free", f"{paths[0]}, which is held at its start", remedy)
+    return free
 
 
 def weights(weighting: str | Sequence[float] | np.ndarray, runs: Sequence[BenchRun]) -> list[float]:

@@ -19,8 +19,8 @@ class Free(TypedDict, total=False):
     Arguments:
         over: parameters to fit, by path, last part of a path, or pattern; all of the law or the vehicle if left out.
         freeze: parameters to hold at their start, named in the same way; those of the test machine and sensors too.
-        bounds: extra limits `{name: (lower, upper)}` in the parameter's unit. Fits to bench records move a start that
-            is outside to the inside.
+        bounds: extra limits `{name: (lower, upper)}` in the parameter's unit; if two names match a parameter, the later
+            one counts. Fits to bench records move a start that is outside to the inside.
         tie: parameters that take the values of others, such as `{"terms.1.**": "terms.0.**"}`: one free value for each
             group (see `jaxdamp.parameters.free_parameters`).
         priors: what is known of parameters beforehand, `{name: (mean, standard deviation)}` in the parameter's unit. It

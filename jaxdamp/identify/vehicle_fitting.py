@@ -21,6 +21,7 @@ from jaxdamp.identify.judging import MOST_WARNINGS, fields_of_fit, on_status
 from jaxdamp.identify.machine import Machine, started_machine
 from jaxdamp.identify.model import VehicleTest, own_names, spread, with_means
 from jaxdamp.identify.noise import Noise, channel_noise
+from jaxdamp.identify.preparing import free_by_record
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd, search
 from jaxdamp.identify.settings import VEHICLE, VehicleSettings, check_keywords
@@ -116,12 +117,11 @@ def fit_vehicle(
     benches = checked_benches(vehicle, bench or {}, rig)
     machine = started_machine(rig, [run for runs in benches.values() for run in runs])
     model = vehicle_test(vehicle, rides, sensors or {}, start, machine)
-    varied = per_record_paths(model, per_record, len(rides))
+    frozen = frozen_paths(model, over, freeze)
+    varied = free_by_record(per_record_paths(model, per_record, len(rides)), frozen)
     named = own_names(model)
     limits, ties = named.find_keys("bounds", bounds), named.find_keys("tie", settings["tie"])
-    free = free_parameters(
-        spread(model, varied, len(rides)), freeze=frozen_paths(model, over, freeze), bounds=limits, tie=ties
-    )
+    free = free_parameters(spread(model, varied, len(rides)), freeze=frozen, bounds=limits, tie=ties)
     _checks.finite("vehicle", free.values)
     expected, dt = priors_on(free, named.find_keys("priors", priors)), settings["dt"]
     drives, per_cycle = drives_of(vehicle, rides, dt), settings["samples_per_cycle"]

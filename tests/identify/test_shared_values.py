@@ -115,6 +115,8 @@ def test_a_value_of_each_record_of_a_law_with_states(maxwell_runs):
         ({"per_record": ["rat"]}, "No parameter is named 'rat'"),
         ({"per_record": ["force_points"]}, "`per_record` must name parameters that are one number"),
         ({"per_record": ["factor"], "weighting": [1.0, 1.0, np.inf]}, "`weighting` must be finite with `per_record`"),
+        ({"per_record": ["factor"], "freeze": ["factor"]}, "is factor, which is held at its start. Remove it from"),
+        ({"per_record": ["factor"], "over": ["force_points"]}, "is factor, which is held at its start. Remove it"),
     ],
 )
 def test_values_of_records_that_make_no_sense_are_refused(sines, options, message):

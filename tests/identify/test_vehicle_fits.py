@@ -169,6 +169,11 @@ def wrong(**changed):
         ([wrong()], {"over": ["spring"]}, "No parameter is named 'spring'"),
         ([wrong()], {"start": "moving"}, "`start` must be one of 'rest', 'free'"),
         ([wrong()], {"per_record": ["sprung_mass"]}, "differ between several records"),
+        (
+            [wrong(), wrong(name="two")],
+            {"per_record": ["sprung_mass"], "freeze": ["sprung_mass"]},
+            "which is held at its start. Remove it from `freeze`",
+        ),
         ([wrong()], {"noise": {"pitch": 1.0}}, "`noise` must be one of 'stroke'"),
         ([wrong()], {"weighting": "runs"}, "weighting"),
         ([wrong()], {"settling": 0.3}, "leave at least half"),
