@@ -36,6 +36,9 @@ class Shown(float):
         self.text = text
         return self
 
+    def __getnewargs__(self) -> tuple[float, str]:
+        return float(self), self.text  # of a copy
+
     def __format__(self, spec: str) -> str:
         return self.text
 

@@ -4,7 +4,7 @@ from importlib import import_module
 
 import pytest
 
-from jaxdamp import Response, _guesses, dampers
+from jaxdamp import Response, _guesses, dampers, identify
 
 
 @pytest.mark.parametrize(
@@ -31,9 +31,12 @@ def test_what_is_answered_is_there_and_what_is_asked_is_not() -> None:
             assert public in import_module(package).__all__
 
 
-def test_a_table_from_a_file(tmp_path) -> None:
+def test_what_a_class_does_not_have() -> None:
     with pytest.raises(AttributeError, match=r"did you mean `jaxdamp.bench.read_table\(path\).law\(\)`"):
         _ = dampers.Table.from_csv
     with pytest.raises(AttributeError, match=r"velocity_histogram\(response"):
         _ = Response.histogram
+    for name in ("estimate", "propagate", "profile", "posterior", "band"):
+        with pytest.raises(AttributeError, match=rf"{name}'; did you mean that of `identify.fit\(training.law, tr"):
+            getattr(identify.Training, name)
     assert not hasattr(dampers.Table([-1.0, 1.0], [-1.0, 1.0]), "from_csv")

@@ -1,5 +1,6 @@
 """The contract of results: status, warnings, summary, table, plot, plain data, report, of every result class."""
 
+import copy
 import importlib
 import inspect
 import json
@@ -7,6 +8,7 @@ import pkgutil
 from types import ModuleType
 from typing import Any, cast
 
+import equinox as eqx
 import matplotlib.figure
 import numpy as np
 import pytest
@@ -166,6 +168,9 @@ def test_a_result_keeps_the_contract(kind, samples, tmp_path) -> None:
     assert isinstance(result.summary, str) and result.summary
     assert isinstance(result.table(), Table) and all(isinstance(each, Table) for each in result.tables().values())
     assert isinstance(result.plot(), matplotlib.figure.Figure)
+    assert [*map(repr, copy.deepcopy(result).tables().values())] == [*map(repr, result.tables().values())]
+    if not issubclass(kind, eqx.Module):  # compared, and looked for in a set, as an object: arrays have no one truth
+        assert result != copy.copy(result) and len({result, result}) == 1
     data = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert data["summary"] == result.summary and data["warnings"] == list(result.warnings)
     assert data["converged"] is result.converged and set(data) > {"summary", "status", "converged", "warnings"}

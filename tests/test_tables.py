@@ -1,17 +1,22 @@
 """Tables: for reading, for files, as plain data."""
 
+import copy
 import json
+import pickle
 
 import numpy as np
 import pytest
 
-from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, typeset_unit
+from jaxdamp._tables import Column, Compared, Shown, Table, comparison_table, percent_change, plain, typeset_unit
 
 
 def test_tables_are_written_with_all_digits_and_read_with_few() -> None:
     table = Table("T", (Column("name"), Column("force", "N", ".1f")), (("a, b", np.pi), ("<c>", None)))
     assert table.to_csv() == 'name,force [N]\n"a, b",3.141592653589793\n<c>,\n'
     assert table.texts() == [("a, b", "3.1"), ("<c>", "")]
+    shown = Table("T", (Column("force", "N", ".1f"),), ((Shown(np.pi, "3"),),))
+    for again in (pickle.loads(pickle.dumps(shown)), copy.deepcopy(shown)):
+        assert again == shown and again.texts() == [("3",)]
     assert "&lt;c&gt;" in table.to_html() and '<td class="number">3.1</td>' in table.to_html()
 
 

@@ -45,7 +45,7 @@ class Spread(NamedTuple):
     effective: float
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Posterior(AbstractResult):
     """Samples of the posterior of the free parameters.
 

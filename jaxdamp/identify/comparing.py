@@ -39,7 +39,7 @@ P = ParamSpec("P")
 Computed: TypeAlias = tuple[Rung | Failure, list[PrintedLaw]]
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Comparison(AbstractComparison[Rung, BenchRun]):
     """Laws fitted to the same records, in the order given."""
 

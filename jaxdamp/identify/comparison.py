@@ -32,7 +32,7 @@ Outcome = TypeVar("Outcome")
 V = TypeVar("V")  # of options
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class AbstractComparison(AbstractResult, Generic[R, D]):
     """Laws or vehicles fitted to the same records, in the order given.
 

@@ -38,7 +38,7 @@ class Fold(NamedTuple):
     also_out: str | None = None  # a second record without part in the fit, for which a law is chosen by this score
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class CrossValidation(AbstractResult):
     """How well laws predict records that they were not fitted to. Results of the same records are joined with `+`.
 

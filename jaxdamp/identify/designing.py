@@ -60,7 +60,7 @@ DEFAULTS: DesignSettings = {
 }  # fmt: skip
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class ExperimentDesign(AbstractResult):
     """Runs chosen for a law, and the standard errors that they are expected to give.
 

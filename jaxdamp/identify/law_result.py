@@ -25,7 +25,7 @@ from jaxdamp.identify.result import Fit
 from jaxdamp.rig import Rig
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class AbstractFitted(AbstractResult):
     """A law fitted to records or trained on them, and how good it is.
 
@@ -116,7 +116,7 @@ class AbstractFitted(AbstractResult):
         }
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class FitResult(AbstractFitted, Fit):
     """A fitted law with its parameters, their uncertainty and its errors: a `Fit` of bench records.
 

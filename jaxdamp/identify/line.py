@@ -23,7 +23,7 @@ LARGE = 0.5  # share of the variance that is due to the fits, from which it is s
 CALL = "control_charts(many, baseline=50)"
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ControlCharts(AbstractResult):
     """The dampers of a line in control charts.
 

@@ -40,7 +40,7 @@ CERTAIN = 4.0  # standard errors by which it must differ as well
 ROUNDING = 1e-9  # of a number, by which it may be beyond a limit
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ManyFits(AbstractResult):
     """One law fitted to many dampers.
 

@@ -118,7 +118,7 @@ def _within_conditions(
     return None
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ProfileCurve(AbstractResult):
     """How much worse the records fit with other values of a parameter, the best of all others given.
 

@@ -194,7 +194,7 @@ def standard_error(slopes: Float[np.ndarray, "... free"], covariance: Float[np.n
     return np.where(np.any((slopes != 0.0) & lost, axis=-1), np.inf, np.sqrt(np.maximum(variance, 0.0)))
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Band(AbstractResult):
     """95 % intervals of the force of a fitted law, each for its own velocity.
 

@@ -30,7 +30,7 @@ SINGULAR = 1e-12  # smallest curvature, relative to the largest, both scaled, th
 
 
 @final
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class RecordSensitivity(AbstractResult):
     """Exact derivatives of functions of a fitted law by the measured forces, all parameters fitted again.
 

@@ -15,7 +15,7 @@ from jaxdamp.identify.profile import ProfileCurve, profile_curve
 from jaxdamp.identify.propagation import Evidence, Propagated, propagate
 
 
-@dataclasses.dataclass(frozen=True, repr=False, kw_only=True)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Fit(AbstractResult):
     """A model fitted to records or numbers, with the uncertainty of its parameters.
 

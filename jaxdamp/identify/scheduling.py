@@ -74,7 +74,7 @@ class LeftOutSetting(NamedTuple):
         return self.result.plot(runs=self.runs)
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ScheduledFit(AbstractResult):
     """One law for several settings.
 

@@ -66,7 +66,7 @@ class Met(NamedTuple):
         return bool(abs(self.deviation) <= 1.0)
 
 
-@dataclasses.dataclass(frozen=True, repr=False, kw_only=True)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class TargetFit(Fit):
     """Parameters that meet targets as well as they can: a `Fit` of numbers.
 

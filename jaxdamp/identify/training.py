@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
+from jaxdamp._guesses import Elsewhere
 from jaxdamp._progress import Progress
 from jaxdamp._results import drawn_by
 from jaxdamp._settings import with_defaults
@@ -73,9 +74,12 @@ TRAIN: TrainSettings = {
 CHUNK = 25  # steps in one compiled call, after which the held-out records are evaluated
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Training(AbstractFitted):
     """A law trained by gradient descent, from the step where its error on the held-out records was smallest.
+
+    It has no standard errors: `fit(training.law, training.runs, freeze=[...])` gives those of the numbers that are not
+    held, such as all but the weights of a network.
 
     Attributes:
         held_out: the records that decided when to stop.
@@ -118,6 +122,13 @@ class Training(AbstractFitted):
             "held_out_fit": with_unit(self.held_out_fit_percent, "%"),
             **self._data("steps", "best_step", "stopped", held_out_rmse="N", history="N", held_out_history="N"),
         }
+
+    estimate, propagate, profile, posterior, band = (
+        Elsewhere(
+            "that of `identify.fit(training.law, training.runs, freeze=[...])`, as `train` has no standard errors"
+        )
+        for _ in range(5)
+    )
 
     plot = drawn_by("training_history", "The errors over the steps of the training.")
 

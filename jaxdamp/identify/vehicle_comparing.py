@@ -106,7 +106,7 @@ class VehicleRung(NamedTuple):
         return table_of_scores(f"Errors of {self.name}: {self.judged_on}", "left out", self.scores)
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class VehicleComparison(AbstractComparison[VehicleRung, RideRecord]):
     """Vehicles fitted to the same drives, in the order given."""
 

@@ -46,7 +46,7 @@ class ChannelScore(NamedTuple):
     size: float = 1.0  # standard deviation of the measured values by that of the predicted ones
 
 
-@dataclasses.dataclass(frozen=True, repr=False, kw_only=True)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class VehicleFit(Fit):
     """A vehicle fitted to records of its motion, with the uncertainty of its parameters: a `Fit` of ride records.
 

@@ -77,7 +77,7 @@ class Summary:
 
 
 @final
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class SweepSummary(AbstractResult):
     """What was kept of a sweep.
 

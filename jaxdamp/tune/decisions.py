@@ -88,7 +88,7 @@ class Difference(NamedTuple):
         return f"{self.damper} has {size}{verdict} (95 %; standard errors {parts})."
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class DamperComparison(AbstractResult):
     """Ride metrics of several dampers on the same roads, with their uncertainties.
 

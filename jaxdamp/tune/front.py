@@ -80,7 +80,7 @@ class FrontParameter(NamedTuple):
     upper: float
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ParetoFront(AbstractResult, Generic[V]):
     """The designs of a front, ordered by the first objective, and the vehicle that the search started from.
 
@@ -179,7 +179,7 @@ class ParetoFront(AbstractResult, Generic[V]):
         changes = [relative_change(self.before[n], float(self.values[n][self.knee])) for n in self.names]
         from_start = ["from 0" if change is None else percentage(change) for change in changes]
         return (
-            f"{len(self)} points, {'; '.join(ends)}. Knee at point {self.knee}: {knee} "
+            f"{len(self)} point{'s' * (len(self) > 1)}, {'; '.join(ends)}. Knee at point {self.knee}: {knee} "
             f"({', '.join(from_start)} from the start). {self.evaluations} designs simulated with derivatives."
         )
 

@@ -74,7 +74,7 @@ FIRST_SEED = 4711  # of fresh roads, which are thereby others than those of usua
 
 
 @final
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Rescore(AbstractResult):
     """The ride metrics of a vehicle before and after its tuning, on each of several roads.
 

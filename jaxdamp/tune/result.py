@@ -69,7 +69,7 @@ class ToleranceEffect(NamedTuple):
         return f"A {100 * self.scatter:g} % scatter of {self.parameter} {cost} {100 * self.deviation:.2g} %."
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class TuneResult(AbstractResult, Generic[V]):
     """A tuned vehicle and the vehicle before the tuning.
 

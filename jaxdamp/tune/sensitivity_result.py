@@ -24,7 +24,7 @@ class CurveSensitivity(NamedTuple):
 
 
 @final
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Sensitivity(AbstractResult):
     """Derivatives of ride metrics.
 

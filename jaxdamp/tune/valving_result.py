@@ -49,7 +49,7 @@ class OutOfReach(NamedTuple):
         )
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ValvingResult(AbstractResult):
     """A mono-tube or twin-tube damper whose valving was chosen for a wanted force.
 

@@ -14,7 +14,7 @@ from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.linear import LinearVehicle, as_linear, linearise
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Modes(AbstractResult):
     """Natural modes, lowest frequency first; prints as a table.
 
