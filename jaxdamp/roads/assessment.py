@@ -200,7 +200,8 @@ def assess_roughness(
     A straight line is taken off the profile, a Hann window put on, and the one-sided periodogram averaged over bands
     of equal width in octaves between 0.011 and 2.83 cycle/m, as far as the record reaches: from its third line and to
     its Nyquist frequency. A straight line through ln G_d over ln n, all bands alike, gives G_d(n0) and the waviness;
-    the mean logarithm of a band with few lines is corrected for its bias, digamma(m) - ln m.
+    the mean logarithm of a band with few lines is corrected for its bias, digamma(m) - ln m, and G_d(n0) for that of
+    means over bands: with w = 3 that of an octave is 6 % above the density at its centre.
 
     The class is that of the fitted G_d(n0). One kilometre of a random road gives G_d(n0) with a standard deviation of
     10 % and the waviness with one of 0.06. For any road driven at a constant speed, the spacing is that of the times
@@ -244,11 +245,14 @@ def assess_roughness(
     logarithm = np.log(psd) - (digamma(independent) - np.log(independent))
     octave = np.log(centre / REFERENCE_SPATIAL_FREQUENCY)
     slope, level = np.polyfit(octave, logarithm, 1)
+    # the mean of n^-w over a band is its value at the centre for w = 0 and 2 only
+    inside = math.log(2.0) / bands_per_octave * np.linspace(-0.5, 0.5, 1001)  # ln n about the centre
+    share = np.sum(np.exp(inside)) / np.sum(np.exp((1.0 + slope) * inside))
     return RoughnessAssessment(
         spatial_frequency=centre,
         displacement_psd=psd,
         lines=lines,
-        roughness_psd=float(np.exp(level)),
+        roughness_psd=float(share * np.exp(level)),
         waviness=float(-slope),
         deviation=float(np.std(logarithm - level - slope * octave)),
         rms=float(np.sqrt(np.mean(values**2))),

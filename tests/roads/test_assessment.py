@@ -42,6 +42,12 @@ def test_other_waviness_is_found_and_told(waviness):
     assert f"differs from the value of the standard, 2: {stronger}" in found.verdict
 
 
+def test_the_roughness_does_not_depend_on_the_width_of_the_bands():
+    z = profile(waviness=4.0, length=5000.0, seed=1)
+    wide, narrow = (assess_roughness(z, 0.1, bands_per_octave=count) for count in (1, 6))
+    assert wide.roughness_psd == pytest.approx(narrow.roughness_psd, rel=0.04)  # the mean over an octave is 17 % higher
+
+
 def test_a_single_wave_has_its_variance_and_is_no_straight_line():
     place = 0.1 * np.arange(10_000)
     found = assess_roughness(0.03 * np.sin(2 * np.pi * place / 4.0) + 1e-4 * profile(seed=3), 0.1)
