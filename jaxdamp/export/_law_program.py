@@ -2,6 +2,7 @@
 
 import dataclasses
 import re
+import unicodedata
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
@@ -67,12 +68,15 @@ def _conditions(model: eqx.Module) -> list[tuple[str, AbstractDamper, Any]]:
 
 
 def identifier(path: str) -> str:
-    """A path or a class as an identifier.
+    """A path, a class or the name of a file as an identifier; letters lose their accents.
 
-    >>> identifier("law.terms.0.rate"), identifier("default")
-    ('law_terms_0_rate', 'default_')
+    >>> identifier("law.terms.0.rate"), identifier("default"), identifier("Dämpfer 2"), identifier("減衰")
+    ('law_terms_0_rate', 'default_', 'Dampfer_2', 'law')
     """
-    name = re.sub(r"\W", "_", path, flags=re.ASCII)
+    plain = "".join(c for c in unicodedata.normalize("NFKD", path) if not unicodedata.combining(c))
+    name = re.sub(r"\W", "_", plain, flags=re.ASCII)
+    if not name.strip("_") and name != path:
+        return "law"
     return f"{name}_" if name in _RESERVED or not name else f"_{name}" if name[0].isdigit() else name
 
 

@@ -137,7 +137,7 @@ def test_zero_among_given_velocities_is_zero(law: Path) -> None:
 
 def test_any_name_of_a_law_becomes_a_name_of_c(law: Path) -> None:
     law.rename(law.parent / "2 Dämpfer.json")
-    assert "_2_D_mpfer_test.c" in jaxdamp("export", "2 Dämpfer.json", "--to", "c").output
+    assert "_2_Dampfer_test.c" in jaxdamp("export", "2 Dämpfer.json", "--to", "c").output
     assert "Option --file must be" in refused(law.parent, "export", "2 Dämpfer.json", "--to", "c", "--file", "2.c")
 
 
