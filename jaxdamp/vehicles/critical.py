@@ -52,16 +52,18 @@ def critical_damping(vehicle: AbstractVehicle) -> dict[str, CriticalDamping]:
     frame = vehicle.frame()
     loads, springs = vehicle.system().static_loads, _springs(frame)  # which is compiled already
     on_road = [{name for name in wheel.point.terms if name[:2] == "z_"} for wheel in frame.wheels]
-    lower = [_lower_end(link, set().union(*on_road)) for link in frame.links]
+    ends = [_ends(link, set().union(*on_road)) for link in frame.links]
+    lower = [end for _, end in ends]
     pairs = {}
-    for link, end, spring in zip(frame.links, lower, springs, strict=True):
+    for link, (above, end), spring in zip(frame.links, ends, springs, strict=True):
         wheels = [i for i, heights in enumerate(on_road) if end in heights]
         if not wheels or lower.count(end) > 1 or end == f"z_{frame.main_body.name}":
             continue
         mass = frame.body(end.removeprefix("z_")).mass
         carried = sum(loads[i] for i in wheels) / STANDARD_GRAVITY - mass
-        stiffness = spring + sum(frame.wheels[i].stiffness for i in wheels)
-        sizes = 2.0 * root(spring * carried), 2.0 * root(stiffness * mass)
+        upper, under = (link.extension.terms[name] ** 2 for name in (above, end))  # one, unless points are scaled
+        stiffness = under * spring + sum(frame.wheels[i].stiffness for i in wheels)
+        sizes = 2.0 * root(upper * spring * carried) / upper, 2.0 * root(stiffness * mass) / under
         for element in link.elements:
             name = prefixed(link.name, element.name)
             pairs[name] = CriticalDamping(*(size / element.count for size in sizes))
@@ -83,11 +85,11 @@ def _stiffness(ports: Ports, deflection: Float[Array, " ports"]) -> Float[Array,
     return ports.stiffness_and_damping(deflection)[0]
 
 
-def _lower_end(link: Link, on_road: set[str]) -> str:
-    """The height of the body at the lower end of a link from a body without wheels; empty of other links."""
+def _ends(link: Link, on_road: set[str]) -> tuple[str, str]:
+    """The heights of the bodies above and below a link from a body without wheels; empty of other links."""
     heights = {name: share for name, share in link.extension.terms.items() if name[:2] == "z_"}
     if on_road.issuperset(heights):  # an anti-roll bar, whose shares may be traced
-        return ""
+        return "", ""
     shares = {name: float(share if (known := behind(share)) is None else known) for name, share in heights.items()}
     above, below = ([name for name, share in shares.items() if share * side > 0.0] for side in (1.0, -1.0))
-    return below[0] if len(above) == len(below) == 1 and above[0] not in on_road else ""
+    return (above[0], below[0]) if len(above) == len(below) == 1 and above[0] not in on_road else ("", "")

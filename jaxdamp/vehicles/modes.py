@@ -110,8 +110,8 @@ class Modes(AbstractResult):
 def modes(vehicle: AbstractVehicle | LinearVehicle) -> Modes:
     """Natural modes of a vehicle linearised about its static equilibrium, or of a result of `linearise`.
 
-    Undamped modes solve K φ = ω² M φ with the stiffness of the laws at rest in K; damped ones are the eigenvalues of
-    the state matrix. The results are NumPy arrays and not differentiable.
+    Undamped modes solve K φ = ω² M φ with the stiffness of the laws at rest in K, to which their states have settled;
+    damped ones are the eigenvalues of the state matrix. The results are NumPy arrays and not differentiable.
 
     Arguments:
         vehicle: a vehicle, or a result of `linearise`.
@@ -130,7 +130,7 @@ def modes(vehicle: AbstractVehicle | LinearVehicle) -> Modes:
     remedy = "In compiled or differentiated code take the eigenvalues of `linearise(vehicle).state_matrix`."
     _checks.untraced("vehicle", linear.state_matrix, remedy)
     a, n = np.asarray(linear.state_matrix), len(linear.coordinates)
-    squares, shapes = np.linalg.eig(-a[n : 2 * n, :n])
+    squares, shapes = np.linalg.eig(-_settled_acceleration(a, n))
     order = np.argsort(np.real(squares))
     frequency = np.sqrt(np.maximum(np.real(squares)[order], 0.0)) / (2 * np.pi)
     values, vectors = np.linalg.eig(a)
@@ -145,6 +145,15 @@ def modes(vehicle: AbstractVehicle | LinearVehicle) -> Modes:
         _scaled(vectors[:n, chosen]),
         np.sort(np.real(values)[~turns]),
     )
+
+
+_STILL = 1e-6  # 1/s, below which a state of a law stands still, such as that of friction
+
+
+def _settled_acceleration(a: np.ndarray, n: int) -> np.ndarray:
+    """Accelerations per coordinate without velocity, the states of the laws where they settle."""
+    of_states = a[2 * n :, 2 * n :].astype(float) - _STILL * np.eye(a.shape[0] - 2 * n)
+    return a[n : 2 * n, :n] - a[n : 2 * n, 2 * n :] @ np.linalg.solve(of_states, a[2 * n :, :n])
 
 
 def _scaled(shapes: np.ndarray) -> np.ndarray:

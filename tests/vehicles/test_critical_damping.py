@@ -9,7 +9,19 @@ import pytest
 
 from jaxdamp import dampers
 from jaxdamp.parameters import replace
-from jaxdamp.vehicles import QuarterCar, Seat, SeatMass, critical_damping, modes
+from jaxdamp.vehicles import (
+    Body,
+    Element,
+    Frame,
+    Link,
+    LumpedVehicle,
+    QuarterCar,
+    Seat,
+    SeatMass,
+    Wheel,
+    critical_damping,
+    modes,
+)
 from jaxdamp.vehicles.presets import full_car_jazar, half_car_002, m113_003, truck_001
 
 
@@ -23,6 +35,14 @@ def test_it_is_that_of_the_modes_where_one_mass_moves_alone():
     below_heavy_body = QuarterCar(1e9, 40.0, 18e3, 200e3, LAW)
     wheel = critical_damping(below_heavy_body)["damper"].wheel
     assert 900.0 / float(wheel) == pytest.approx(modes(below_heavy_body).damping_ratio[-1], rel=1e-4)
+
+
+def test_between_scaled_points_it_is_of_the_rate_there():
+    body, wheel = Body("sprung", 300.0), Body("unsprung", 40.0)
+    link = Link("", 0.7 * (body.at() - wheel.at()), 18e3 / 0.7**2, elements=(Element("damper", LAW),))
+    scaled = critical_damping(LumpedVehicle(Frame((body, wheel), (link,), (Wheel("", wheel.at(), 2e5),))))["damper"]
+    plain = critical_damping(QuarterCar(300.0, 40.0, 18e3, 2e5, LAW))["damper"]
+    np.testing.assert_allclose(scaled, np.array(plain) / 0.7**2, rtol=1e-12)
 
 
 def test_a_spring_among_the_laws_counts():

@@ -59,6 +59,13 @@ def test_undamped_modes_solve_the_eigenproblem_and_overdamped_ones_do_not_oscill
     assert "without oscillation" in str(stiff)
 
 
+def test_undamped_modes_have_the_stiffness_to_which_states_settle():
+    gas = dampers.Linear(2500.0) + dampers.GasSpring(2e6, 6e-5, 1e-4)
+    plain, behind = (modes(quarter_car_000(law)).undamped_frequency for law in (gas, dampers.Lag(gas, 0.004)))
+    np.testing.assert_allclose(behind, plain, rtol=1e-6)
+    assert plain[0] > 1.002 * modes(quarter_car_000()).undamped_frequency[0]
+
+
 @pytest.mark.slow
 def test_walking_beam_pitches_on_its_tyres_alone():
     truck = replace(truck_001(), {"tandem.tyre_damping": 0.0})
