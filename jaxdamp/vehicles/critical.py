@@ -59,14 +59,14 @@ def critical_damping(vehicle: AbstractVehicle) -> dict[str, CriticalDamping]:
         wheels = [i for i, heights in enumerate(on_road) if end in heights]
         if not wheels or lower.count(end) > 1 or end == f"z_{frame.main_body.name}":
             continue
-        mass = frame.body(end.removeprefix("z_")).mass
+        mass, tyres = frame.body(end.removeprefix("z_")).mass, sum(frame.wheels[i].stiffness for i in wheels)
         carried = sum(loads[i] for i in wheels) / STANDARD_GRAVITY - mass
-        upper, under = (link.extension.terms[name] ** 2 for name in (above, end))  # one, unless points are scaled
-        stiffness = under * spring + sum(frame.wheels[i].stiffness for i in wheels)
-        sizes = 2.0 * root(upper * spring * carried) / upper, 2.0 * root(stiffness * mass) / under
+        shares = link.extension.terms
+        upper, under = shares[above] ** 2, shares[end] ** 2  # one, unless points are scaled
+        body, wheel = (root(upper * spring * carried) / upper, root((under * spring + tyres) * mass) / under)
         for element in link.elements:
-            name = prefixed(link.name, element.name)
-            pairs[name] = CriticalDamping(*(size / element.count for size in sizes))
+            share = 2.0 / element.count
+            pairs[prefixed(link.name, element.name)] = CriticalDamping(share * body, share * wheel)
     return pairs
 
 
