@@ -28,10 +28,11 @@ def label_axis(axes: Axes, name: Literal["x", "y"], label: str, *, turns: bool =
     found = re.search(r"\[([^\[\]]+)\]", label)
     shown = display().of(found[1] if found else "", signed=turns or display().signed(label))
     factor = times * shown.factor
-    if factor == 1.0:
-        return
-    from jaxdamp.plots._ticks import LogTicksInUnit, TicksInUnit
+    from jaxdamp.plots._ticks import FewTicks, LogTicksInUnit, TicksInUnit
 
+    if factor == 1.0:
+        FewTicks.along(axis)
+        return
     log = axis.get_scale() == "log"
     ticks = LogTicksInUnit(factor) if log else TicksInUnit(factor)
     axis.set_major_locator(ticks)
@@ -39,7 +40,8 @@ def label_axis(axes: Axes, name: Literal["x", "y"], label: str, *, turns: bool =
     if log:
         axis.set_minor_locator(LogTicksInUnit(factor, range(2, 10)))
         axis.set_minor_formatter(NullFormatter())
-    elif factor < 0.0:
+    FewTicks.along(axis)
+    if factor < 0.0 and not log:
         axis.set_inverted(True)
         change = f"{name}lim_changed"
         axes.callbacks.connect(change, lambda _: None if axis.get_inverted() else axis.set_inverted(True))
@@ -68,13 +70,12 @@ def _longest(text: "matplotlib.text.Text", axes: Axes) -> float:
 
 
 def few_ticks(axes: Axes, most: int) -> None:
-    """At most so many ticks along the abscissa, and no more than its labels have room for, in the unit shown."""
-    from matplotlib.ticker import MaxNLocator
-
+    """At most so many ticks along the abscissa, in the unit shown."""
     from jaxdamp.plots._ticks import FewTicks
 
-    before = axes.xaxis.get_major_locator()
-    assert isinstance(before, MaxNLocator)  # of a linear axis
-    before.set_params(steps=[1, 2, 2.5, 4, 5, 10])
+    FewTicks.along(axes.xaxis, most)
 
-    axes.xaxis.set_major_locator(FewTicks(before, most))
+
+def small(count: int) -> float:
+    """The size of so many crosses: many leave something of what they lie on to see."""
+    return min(4.0, max(60.0 / count**0.5, 1.0))

@@ -124,11 +124,12 @@ def road(axes: Axes, shown: _rides.Rides) -> None:
     speed = 1.0 if speed is None else speed
     if shown.responses is None or heights is None:
         assert isinstance(shown.road, WhiteRoad)
-        roughness = float(shown.road.velocity_psd) / (2.0 * np.pi) ** 2 / speed / 0.1**2
+        driven, roughness = "", float(shown.road.velocity_psd) / (2.0 * np.pi) ** 2 / speed / 0.1**2
         axes.loglog(n, roughness * (n / 0.1) ** -2.0, **_style.AFTER)
         name = road_class(roughness)
     else:
-        spacing = speed * shown.responses[0].dt
+        spacing, length = speed * shown.responses[0].dt, speed * float(shown.responses[0].time[-1])
+        driven = f" as driven, over {display().words(f'{_style.short(length)} m')}"
         measured = assess_roughness(heights, spacing, bands_per_octave=3)
         axes.loglog(measured.spatial_frequency, measured.displacement_psd, **_style.AFTER)
         name = measured.road_class
@@ -141,7 +142,7 @@ def road(axes: Axes, shown: _rides.Rides) -> None:
     axes.set_ylim(0.2 * low * line[-1], 4.0 * high * line[0])
     axes.set_xlim(n[0], n[-1])
     _style.plain_log_axis(axes.xaxis)
-    title = f"Road: ISO 8608 class {name}, {display().speed(speed)}"
+    title = f"Road{driven}: ISO 8608 class {name}, {display().speed(speed)}"
     _style.dress(axes, "spatial frequency [cycle/m]", "height PSD [m³]", title)
 
 

@@ -143,10 +143,11 @@ class Rides:
         return [law] if car.passive is car or not takes_command(law) else laws_at_levels(law)
 
     def dampers(self) -> list[str]:
-        """The paths of the first laws that differ, or of the first ones."""
+        """The paths of the first laws that differ, or of the first ones whose motion is known."""
         (first, last), paths = self.passive, damper_paths(self.passive[0])
         differ = [p for p in paths if repr(get(first, p)) != repr(get(last, p))]
-        return (differ or paths)[:_MOST_DAMPERS]
+        moving = [p for p in paths if damper_velocity(self, p, 1) is not None]
+        return (differ or moving or paths)[:_MOST_DAMPERS]
 
 
 def without_answer(tuned: TuneResult) -> str:

@@ -14,7 +14,7 @@ from jaxdamp._types import Artist, Axes, Figure
 from jaxdamp._words import (
     class_words as class_words,
     first_upper as first_upper,
-    in_words as in_words,
+    in_words as _all_words,
     metric_words as metric_words,
     path_words as path_words,
     said as said,
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 
 T = TypeVar("T")
+_LONGEST, _END = 36, 16  # letters of a name that is drawn, and of its end
 Look = dict[str, Any]  # keywords of a line, patch or text
 # Every two of these, and black, differ for each kind of colour vision, and all stand out 3:1 from white paper.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#9933FF", "#663300", "#001A99")
@@ -94,6 +95,20 @@ def new_figure(width: float, height: float) -> Figure:
 def line_style(index: int) -> Look:
     """Colour and dash of the curve of that number; the dash changes once the colours are used up."""
     return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index // len(COLOURS) % len(DASHES)]}
+
+
+def brief(name: str) -> str:
+    """A name that leaves room for the picture: without the middle of a long one, as files often differ at the end.
+
+    >>> brief("front damper"), brief("front damper of the second prototype, cold, 2.5Hz")
+    ('front damper', 'front damper of the…type, cold, 2.5Hz')
+    """
+    return name if len(name) <= _LONGEST else f"{name[: _LONGEST - _END - 1].rstrip()}…{name[-_END:].lstrip()}"
+
+
+def in_words(name: str) -> str:
+    """The name of a law, a design, a parameter or a setting as pictures say it."""
+    return brief(_all_words(name))
 
 
 def design_styles(names: Sequence[str], before: str | None = None, reference: str | None = None) -> dict[str, Look]:
@@ -171,6 +186,17 @@ def plain_log_axis(axis: "matplotlib.axis.Axis") -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
+def within_six_decades(axes: Axes) -> None:
+    """The ordinate of spectra: far below their peak they show the window that they were estimated with."""
+    if any(np.any(np.asarray(line.get_ydata(), dtype=float) > 0.0) for line in axes.get_lines()):
+        low, high = axes.get_ylim()
+        axes.set_ylim(max(low, 1e-6 * high), high)
+        return
+    axes.set_yscale("linear")  # zero has no place on a logarithmic axis
+    axes.set_yticks([])
+    axes.text(0.5, 0.55, "no motion", transform=axes.transAxes, ha="center", color=GREY)
+
+
 def _short_tick(value: float, _: int | None) -> str:
     return short(value)
 
@@ -190,9 +216,13 @@ def label_ends(axes: Axes, lines: Sequence["matplotlib.lines.Line2D"], *, outsid
         if len(points):
             shares = axes.transAxes.inverted().transform(axes.transData.transform(points))
             ends.append((*shares[np.argmax(shares[:, 0])], line))
-    place = -np.inf
-    for x, y, line in sorted(ends, key=lambda end: end[1]):
-        place = max(min(y, 1.0), place + _GAP)
+    ends.sort(key=lambda end: end[1])
+    place, places = 1.0 + _GAP, np.array([end[1] for end in ends])
+    for i in reversed(range(len(ends))):  # down from the top, and up again from the bottom
+        place = places[i] = min(places[i], place - _GAP)
+    place = -_GAP
+    for (x, _, line), y in zip(ends, places, strict=True):
+        place = max(y, place + _GAP)
         look = {"color": line.get_color(), "fontsize": "small", "va": "center", "annotation_clip": False}
         to = (1.0 if outside else min(x, 1.0)) + 0.015, place
         axes.annotate(str(line.get_label()), to, xycoords="axes fraction", **look)
@@ -234,12 +264,18 @@ def cross(axes: Axes, horizontal: bool = True, vertical: bool = True) -> None:
 def legend_beside(
     figure: Figure, handles: Sequence[Artist], title: str = "", place: Literal["upper", "lower"] = "upper"
 ) -> None:
-    """A legend to the right of all axes, never over data."""
+    """A legend to the right of all axes, never over data: two columns at most, what has no room there is counted."""
+    from matplotlib.lines import Line2D
+
+    rows = max(int((figure.get_figheight() - _HEAD) / _LINE), 2)
+    if (more := len(handles) - 2 * rows) > 0:
+        handles = [*handles[: 2 * rows - 1], Line2D([], [], linestyle="", label=f"and {more + 1} more")]
     _in_words(handles)
     look: Look = {"loc": f"outside right {place}", "frameon": False, "alignment": "left"}
-    figure.legend(handles=list(handles), title=title or None, **look)
+    figure.legend(handles=list(handles), title=title or None, ncols=1 + (len(handles) > rows), **look)
 
 
+_HEAD, _LINE = 0.6, 0.22  # inch, above the entries of a legend, and of each
 _LETTERS = 9  # in an inch of a legend, with room for narrower figures
 
 

@@ -24,6 +24,7 @@ from jaxdamp.rig import march
 
 
 _MOST_LABELS = 10  # at the ends of curves
+_SAME = 0.005  # difference of curves, relative to the largest force, that a line is too wide to show
 
 
 @of_known_numbers
@@ -84,10 +85,10 @@ def force_velocity(
     shaded = fitted_range.shade(axes, laws.values(), points)
     _style.dress(axes, _style.VELOCITY, _style.FORCE, title or _title(alone, runs), zero="xy")
     axes.set_xlim(float(points.min()), float(points.max()))
-    _name(axes, measured, curves, shaded)
+    _name(figure, axes, measured, curves, shaded)
     said = f"The measured points are drawn without the static force of {_style.quantity(without, 'N', 'static force')}"
     own = ", and each law with the difference of its own" * any(extra.values())
-    remarks = [note, f"{said}{own}: gas or zero error." if runs and (without or own) else "", *gaps]
+    remarks = [note, f"{said}{own}: gas or zero error." if runs and (without or own) else "", *gaps, _alike(curves)]
     _style.note_below(figure, [remark for remark in remarks if remark])
     return figure
 
@@ -104,22 +105,38 @@ def _static_forces(
     return first, {name: float(force) - first for name, force in by_law.items()}
 
 
-def _name(axes: Axes, measured: list, curves: list, shaded: list) -> None:
-    """Several curves have their names at their ends, one or many in the legend, as all else that is drawn."""
+def _name(figure: Figure, axes: Axes, measured: list, curves: list, shaded: list) -> None:
+    """Several curves have their names at their ends, one or many in a legend, of many beside the axes."""
     from matplotlib.lines import Line2D
 
     lines = [curve for curve in curves if isinstance(curve, Line2D)]
     if direct := 1 < len(lines) <= _MOST_LABELS:
         _style.label_ends(axes, lines, outside=True)
     handles = [*measured, *(curve for curve in curves if not (direct and curve in lines)), *shaded]
-    if handles:
+    if len(lines) > _MOST_LABELS:
+        _style.legend_beside(figure, handles)
+    elif handles:
         axes.legend(handles=handles, loc="upper left", frameon=False, fontsize="small")
+
+
+def _alike(curves: list) -> str:
+    """Which curves hide one another, in a sentence."""
+    from matplotlib.lines import Line2D
+
+    lines = {str(one.get_label()): np.asarray(one.get_ydata(), float) for one in curves if isinstance(one, Line2D)}
+    close = _SAME * max((float(np.nanmax(np.abs(force), initial=0.0)) for force in lines.values()), default=0.0)
+    groups: dict[str, list[str]] = {}
+    for name, force in lines.items():
+        same = (first for first in groups if np.allclose(lines[first], force, rtol=0.0, atol=close, equal_nan=True))
+        groups.setdefault(next(same, name), []).append(name)
+    over = [", ".join(group) for group in groups.values() if len(group) > 1]
+    return f"Curves over one another, within {100.0 * _SAME:g} % of the largest force: {'; '.join(over)}." * bool(over)
 
 
 def _title(law: str, runs: Sequence[BenchRun]) -> str:
     """What the picture shows: the only law, and the records."""
     names = [law] if law else []
-    names += [runs[0].name if len(runs) == 1 else f"{len(runs)} records"] if runs else []
+    names += [_style.brief(runs[0].name) if len(runs) == 1 else f"{len(runs)} records"] if runs else []
     return "Force over velocity" + (f": {', '.join(names)}" if names else "")
 
 
@@ -184,7 +201,7 @@ def force_velocity_family(table: ForceVelocityTable, *, page: bool = False) -> F
     axes, below = figure.subplots(2, height_ratios=(3, 2)) if page else (figure.subplots(), None)
     handles = []
     for index, curve in enumerate(table.curves):
-        look = {"color": _style.graded(index, len(table.curves)), "label": curve.setting or table.name}
+        look = {"color": _style.graded(index, len(table.curves)), "label": _style.brief(curve.setting or table.name)}
         handles += axes.plot(np.asarray(curve.velocity), np.asarray(curve.force), "o-", markersize=4.0, **look)
     _style.dress(axes, _style.VELOCITY, _style.FORCE, f"Force over velocity: {table.name}", zero="xy")
     if below is None:
@@ -265,10 +282,12 @@ def law_card(
     stroke, velocity, force, change = _loops(without_fitted_ranges(law), float(amplitude), frequencies)
     figure = _style.new_figure(13.0, 3.9)
     over_velocity, over_stroke, effects = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.15))
+    named = np.linspace(0, len(frequencies) - 1, min(len(frequencies), _MOST_CURVES)).round()
     for index, frequency in enumerate(frequencies):
+        label = f"{_style.short(frequency)} Hz" if index in named else "_nolegend_"
         look = {"color": _style.graded(index, len(frequencies)), "linewidth": 1.6}
         fitted_range.curve(over_velocity, law, velocity[index], force[index], **look)
-        over_stroke.plot(1e3 * stroke[index], force[index], label=f"{frequency:g} Hz", **look)
+        over_stroke.plot(1e3 * stroke[index], force[index], label=label, **look)
     fastest = int(np.argmax(frequencies))
     sizes = np.max(np.abs(change[fastest]), axis=0)
     drawn = [int(i) for i in np.argsort(-sizes, kind="stable")[:_MOST_CURVES] if sizes[i] > 0]

@@ -97,7 +97,10 @@ def cross_validation(result: CrossValidation) -> Figure:
         folds = [fold for fold in result.folds if fold.group == group]
         rows = np.array([laws.index(fold.law) for fold in folds]) + 0.5 * ((number + 0.5) / count - 0.5)
         values = [fold.fit_percent for fold in folds]
-        colour, label = _style.COLOURS[number % len(_style.COLOURS)], "all" if group is None else f"{group}"
+        colour, label = (
+            _style.COLOURS[number % len(_style.COLOURS)],
+            "all" if group is None else _style.brief(f"{group}"),
+        )
         handles += axes.plot(values, rows, "o", markersize=5, alpha=0.8, color=colour, label=label)
     means = [result.fit_percent(law) for law in laws]
     handles += axes.plot(means, np.arange(len(laws)), "|", markersize=16, color=_style.BLACK, label="mean", mew=2)
@@ -133,7 +136,7 @@ def experiment(design: ExperimentDesign) -> Figure:
     _style.dress(left, "stroke, zero to peak [mm]", "peak velocity [m/s]", "Tests")
     _style.dress(right, "expected standard error [% of the value]", "", "Parameters")
     right.set_xscale("log")
-    right.set_yticks(rows + 0.2 * (len(sets) - 1), design.free.names)
+    right.set_yticks(rows + 0.2 * (len(sets) - 1), list(map(_style.path_words, design.free.names)))
     _style.legend_above(figure, handles)
     return figure
 
@@ -177,8 +180,8 @@ def profile(curve: ProfileCurve) -> Figure:
         if np.isfinite(end):
             axes.axvline(end, color=_style.COLOURS[0], linewidth=0.8)
     axes.axhline(curve.level, color="0.6", linewidth=0.8)
-    unit = f" [{curve.unit}]" if curve.unit else ""
-    _style.dress(axes, f"{curve.name}{unit}", "cost [squared standard errors]", "Profile")
+    label = _style.labelled(_style.path_words(curve.name), curve.unit)
+    _style.dress(axes, label, "cost [squared standard errors]", "Profile")
     axes.set_ylim(0.0, 3.0 * curve.level)
     _style.legend_beside(figure, line)
     return figure

@@ -16,10 +16,9 @@ from jaxdamp.bench import (
     LimitCheck,
     Measurement,
     as_runs,
-    last_steady_cycle,
 )
 from jaxdamp.plots import _axes, _style
-from jaxdamp.plots.loops import spread, with_speed
+from jaxdamp.plots.loops import closed_cycle, spread, with_speed
 
 
 def records(runs: BenchRun | Iterable[BenchRun], *, most: int = 12) -> Figure:
@@ -41,7 +40,7 @@ def records(runs: BenchRun | Iterable[BenchRun], *, most: int = 12) -> Figure:
     handles = []
     for number, run in enumerate(shown):
         look = {"color": _style.graded(number, len(shown)), "linewidth": 1.1}
-        part = last_steady_cycle(run)
+        part = closed_cycle(run)
         panels["v"].plot(run.velocity[part], run.force[part], **look)
         panels["x"].plot(1e3 * run.stroke[part], run.force[part], **look)
         panels["stroke"].plot(run.time - run.time[0], 1e3 * run.stroke, **look)

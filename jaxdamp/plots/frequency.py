@@ -1,5 +1,6 @@
 """Over frequency: modes, vehicles on a sine of their road, laws on the test machine, what is felt, and roughness."""
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -33,7 +34,8 @@ def modes(result: Modes) -> Figure:
         axes.barh(rows, amplitude, 0.6, color=[_style.COLOURS[1 if a < 0 else 0] for a in amplitude])
         axes.set_xlim(-1.1, 1.1)
         _style.dress(axes, "amplitude [–]", "", f"{frequency:.3g} Hz, damping ratio {ratio:.2g}", zero="x")
-    panels[0].set_yticks(rows, result.coordinates)
+    words = [re.sub(r"^z_(.*)", r"\1_displacement", name) for name in result.coordinates]
+    panels[0].set_yticks(rows, list(map(_style.metric_words, words)))
     panels[0].invert_yaxis()
     return figure
 

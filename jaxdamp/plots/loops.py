@@ -151,7 +151,7 @@ def _title(result: FitResult, runs: Sequence[BenchRun], shown: Sequence[BenchRun
     own = runs is result.runs
     percent, rmse = (result.fit_percent, result.rmse) if own else result.score(runs)[:2]
     new = not any(run is fitted for run in runs for fitted in result.runs)
-    records = f"{runs[0].name if len(runs) == 1 else f'{len(runs)} records'}{' not fitted' * new}"
+    records = f"{_style.brief(runs[0].name) if len(runs) == 1 else f'{len(runs)} records'}{' not fitted' * new}"
     name = name or _style.law_name(result.law)
     score = f"{name}: fit {percent:.1f} %, RMSE {_style.quantity(rmse, 'N')} on {records}"
     return display().words(score) + (
@@ -166,7 +166,7 @@ def _block_means(values: Float[np.ndarray, " samples"], size: int) -> Float[np.n
 
 def with_speed(run: BenchRun) -> str:
     """The name of a record with its peak velocity, for a legend."""
-    return f"{run.name} ({_style.quantity(run.peak_velocity, 'm/s')})"
+    return f"{_style.brief(run.name)} ({_style.quantity(run.peak_velocity, 'm/s')})"
 
 
 def closed_cycle(run: BenchRun) -> np.ndarray:

@@ -34,12 +34,12 @@ def many_fits(result: ManyFits) -> Figure:
         axes.errorbar(
             places, result.values[:, number], error, fmt="o", color=_style.COLOURS[0], markersize=4, capsize=2
         )
-        _style.dress(axes, label, f"[{units[number] or '–'}]", name)
+        _style.dress(axes, label, f"[{typeset_unit(units[number], '–')}]", _style.path_words(name))
     panels[-1].plot(places, result.rmse, "o", color=_style.COLOURS[1], markersize=4)
     _style.dress(panels[-1], label, "[N]", "root of the mean squared force error")
     if result.settings is None and len(result.names) <= _NAMED:
         for axes in panels:
-            axes.set_xticks(places, result.names, rotation=30, ha="right")
+            axes.set_xticks(places, list(map(_style.brief, result.names)), rotation=30, ha="right")
     figure.suptitle(f"{len(result.names)} dampers, ± 2 standard errors")
     return figure
 
@@ -56,7 +56,8 @@ def posterior(result: Posterior) -> Figure:
         axes.axvline(parameter.mean, color=_style.BLACK, linewidth=1.2)
         for end in parameter.interval:
             axes.axvline(end, color=_style.BLACK, linewidth=0.9, linestyle="--")
-        _style.dress(axes, f"{parameter.name} [{parameter.unit or '–'}]", "samples", f"r hat {parameter.r_hat:.3f}")
+        label = f"{_style.path_words(parameter.name)} [{typeset_unit(parameter.unit, '–')}]"
+        _style.dress(axes, label, "samples", f"r hat {parameter.r_hat:.3f}")
     figure.suptitle(f"Posterior from {len(result.samples)} samples: mean and 95 % interval")
     return figure
 
@@ -119,6 +120,7 @@ def damper_comparison(comparison: DamperComparison) -> Figure:
     remedy = "The call is `damper_comparison(comparison)` with the result of `tune.compare_dampers`."
     _checks.instance("comparison", comparison, DamperComparison, "be a comparison of dampers", remedy)
     first, *others = comparison.values
+    base = _style.brief(first)
     metrics = list(comparison.units)
     figure = _style.new_figure(8.5, 1.6 + 0.3 * len(metrics) * max(len(others), 1))
     axes = figure.add_subplot()
@@ -135,12 +137,12 @@ def damper_comparison(comparison: DamperComparison) -> Figure:
         axes.errorbar(change, rows, xerr=_finite(margin), fmt="none", ecolor=colour, capsize=3.0, linewidth=1.0)
         axes.errorbar(change, rows, xerr=_finite(from_parameters), fmt="none", **thick)
         axes.scatter(change, rows, 40.0, faces, edgecolors=colour, zorder=3)
-        handles.append(axes.scatter([], [], 40.0, colour, label=f"{name} relative to {first}"))
+        handles.append(axes.scatter([], [], 40.0, colour, label=f"{_style.brief(name)} relative to {base}"))
     axes.set_yticks(range(len(metrics)), [_style.metric_words(metric) for metric in metrics])
     axes.invert_yaxis()
     roads = len(next(iter(comparison.values[first].values())))
     where = f"on the same {roads} roads" if roads > 1 else "on a white road"
-    _style.dress(axes, "change [%]", "", f"Ride metrics beside those of {first}, {where}", zero="x")
+    _style.dress(axes, "change [%]", "", f"Ride metrics beside those of {base}, {where}", zero="x")
     axes.grid(False, axis="y")
     _style.legend_above(figure, handles)
     legend = "With 95 % intervals; hollow where there may be no difference; thick: standard error from the parameters."

@@ -40,7 +40,7 @@ def preflight(found: Preflight) -> Figure:
         text = "" if worst.size is None else _size(worst)
         axes.text(x, y, text + f" ({len(findings)})" * (len(findings) > 1), ha="center", va="center", fontsize="small")
     axes.set_xticks(range(len(names)), names, rotation=30, ha="left")
-    axes.set_yticks(range(len(records)), records)
+    axes.set_yticks(range(len(records)), list(map(_style.brief, records)))
     axes.xaxis.tick_top()
     axes.set_xlim(-0.5, max(len(names), _FEWEST) - 0.5)
     axes.set_ylim(max(len(records), 1) - 0.5, -0.5)
@@ -52,7 +52,11 @@ def preflight(found: Preflight) -> Figure:
     clean = len(found.records) - len(records)
     _style.note_below(figure, [f"{clean} of {len(found.records)} records without findings."] * bool(clean))
     figure.suptitle(_style.said(found.summary), wrap=True)
-    _style.legend_beside(figure, [Patch(color=colour, alpha=0.35, label=word) for word, colour in _SHADES.items()])
+    seen = [(word, colour) for word, colour in _SHADES.items() if any(f.severity == word for f in found.findings)]
+    if seen:
+        _style.legend_beside(figure, [Patch(color=colour, alpha=0.35, label=word) for word, colour in seen])
+    else:
+        axes.set_axis_off()
     return figure
 
 

@@ -99,12 +99,11 @@ def ride(
     name = re.sub(r"^sprung_", "body_", channels[0]).replace("_", " ")
     _style.dress(spectrum, "frequency [Hz]", f"power spectral density [({unit})²/Hz]", f"Spectrum of the {name}")
     _style.plain_log_axis(spectrum.xaxis)
+    _style.within_six_decades(spectrum)
     spectrum.set_xlim(*frequencies)
     if weighting is not None:
         third_octaves(figure.add_subplot(right[1]), felt, weighting, unit, name)
     _style.legend_above(figure, handles)
-    low, high = spectrum.get_ylim()
-    spectrum.set_ylim(max(low, 1e-6 * high), high)  # far below, a spectrum shows the window that it was estimated with
     vehicle = _style.first_upper(_style.class_words(first.vehicle))
     title = title or f"{vehicle}, ride of {float(first.time[-1] - first.time[0]):g} s"
     rows[0].set_title(_style.said(title), loc="left", fontsize="medium")
@@ -194,7 +193,7 @@ def damper_use(responses: Response | Mapping[str, Response], *, damper: str | No
     figure = _style.new_figure(12.0, 4.6)
     trace, time_share, energy_share = figure.subplots(1, 3, width_ratios=(1.3, 1.0, 1.0))
     records = {name: _record(response, damper) for name, response in responses.items()}
-    reach = 1.02 * max(float(np.max(np.abs(velocity))) for velocity, _ in records.values())
+    reach = 1.02 * max(float(np.max(np.abs(velocity))) for velocity, _ in records.values()) or 1.0
     edges = np.linspace(-reach, reach, _BINS + 1)
     middles, handles, gaps = 0.5 * (edges[1:] + edges[:-1]), [], []
     laws = {name: response.vehicle.frame().element(damper).law for name, response in responses.items()}
@@ -207,8 +206,8 @@ def damper_use(responses: Response | Mapping[str, Response], *, damper: str | No
         lines, remarks = fitted_range.settled(trace, law, held, name or "law", label=label, **style)
         handles, gaps = handles + lines, gaps + remarks
         for axes, weight in ((time_share, np.ones_like(velocity)), (energy_share, force * velocity)):
-            share = np.histogram(velocity, edges, weights=weight)[0] / np.sum(weight)
-            axes.step(middles, 100.0 * share, where="mid", **style)
+            whole = float(np.sum(weight)) or np.nan  # nothing is dissipated at rest
+            axes.step(middles, 100.0 * np.histogram(velocity, edges, weights=weight)[0] / whole, where="mid", **style)
     reached = np.linspace(-reach, reach, _SHADE_POINTS)
     shaded = [fitted_range.shade(axes, laws.values(), reached) for axes in (trace, time_share, energy_share)]
     handles += shaded[0]

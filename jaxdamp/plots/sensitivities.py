@@ -74,7 +74,8 @@ def sensitivity(result: Sensitivity, *, most: int = MOST) -> Figure:
         values = [np.nan_to_num(result.elasticities(metric)[name]) for name in names]
         colours = [_style.COLOURS[1] if value > 0 else _style.COLOURS[0] for value in values]
         axes.barh(np.arange(len(names)), values, 0.65, color=colours)
-        axes.set_yticks(np.arange(len(names)), names if column == 0 else [""] * len(names))
+        words = [_style.path_words(name) if column == 0 else "" for name in names]
+        axes.set_yticks(np.arange(len(names)), words)
         axes.invert_yaxis()
         _style.dress(axes, "change for +1 % [%]", "", _style.metric_words(metric), zero="x")
         axes.grid(False, axis="y")
@@ -94,7 +95,7 @@ def record_sensitivity(result: RecordSensitivity) -> Figure:
         axes = figure.add_subplot(1, len(result.values), column + 1)
         for number, (record, slopes) in enumerate(zip(result.records, result.by_sample[name], strict=True)):
             colour = _style.COLOURS[number % len(_style.COLOURS)]
-            axes.plot(result.velocity[number], 10.0 * slopes, ".", ms=2.5, color=colour, label=record)
+            axes.plot(result.velocity[number], 10.0 * slopes, ".", ms=2.5, color=colour, label=_style.brief(record))
         _style.dress(axes, _style.VELOCITY, "change for 10 N more in one sample", name, zero="xy")
         if column == 0 and len(result.records) <= MOST:
             axes.legend()

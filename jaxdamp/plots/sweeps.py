@@ -19,7 +19,7 @@ MOST_CURVES = 6
 PRESENT: _style.Look = {"label": "present", "linestyle": "", "clip_on": False, "zorder": 5.0} | _style.PRESENT
 ON_COLOURS: _style.Look = {"color": "white", "markeredgecolor": _style.BLACK}  # of a mark in a map
 BEST: _style.Look = {"linestyle": "", "clip_on": False, "zorder": 4.5} | _style.BEST | ON_COLOURS
-HATCHES = ("////", "\\\\\\\\", "xxxx", "....")
+HATCHES, RINGS = ("////", "\\\\\\\\", "xxxx", "...."), ("o", "s", "D", "^")  # of limits
 
 
 class _End(NamedTuple):
@@ -147,33 +147,32 @@ def _curves(shown: _Shown, name: str, others: list[str]) -> None:
     figure, plot, data, metric, ends, present = shown
     lines = data[metric].transpose(*others, name).values.reshape(-1, data.sizes[name])
     failed = data["failed"].transpose(*others, name).values.reshape(lines.shape)
-    where = data[name].values
+    where, drawn = data[name].values, []
     for number, (line, value) in enumerate(zip(lines, data[others[0]].values if others else [None], strict=True)):
-        label = None if value is None else f"{others[0]} = {_value(data, others[0], float(value))}"
-        plot.plot(where, line, marker="o", markersize=3.0, label=label, **_style.line_style(number))
+        label = None if value is None else f"{_words(data, others[0])} = {_value(data, others[0], float(value))}"
+        drawn += plot.plot(where, line, marker="o", markersize=3.0, label=label, **_style.line_style(number))
     _style.dress(plot, _label(data, name), _label(data, metric))
     if others:
-        plot.legend(frameon=False)
+        _style.legend_beside(figure, drawn, place="lower")
     marks = []
     for number, end in enumerate(ends):
         beyond = end.beyond(data[end.name].transpose(*others, name).values.reshape(lines.shape))
         places = np.broadcast_to(where, lines.shape)[beyond]
-        size, colour = 60.0 + 50.0 * number, _style.COLOURS[-1 - number % len(_style.COLOURS)]
-        marks.append(plot.scatter(places, lines[beyond], size, "none", edgecolors=colour, label=end.label, zorder=4))
+        look: _style.Look = {"marker": RINGS[number % len(RINGS)], "edgecolors": _style.BAD, "zorder": 4}
+        marks.append(plot.scatter(places, lines[beyond], 60.0 + 50.0 * number, "none", label=end.label, **look))
         if end.name == metric:
-            plot.axhline(end.value, color=colour, linestyle="--", linewidth=1.0)
+            plot.axhline(end.value, **_style.LIMIT)
     if name in present:
         marks += _mark_present(plot, data, [name], present, (present[name], present.get(metric, np.nan)))
         plot.axvline(present[name], color=_style.BLACK, linestyle=":", linewidth=1.0)
         plot.set_xlim(*_widened(where))
-    if marks:
-        _style.legend_above(figure, marks, 2)
     if failed.any():
         crossed = where[failed.any(axis=0)]
         foot = np.zeros(len(crossed))
-        mark = plot.scatter(crossed, foot, marker="x", color=_style.BLACK, transform=plot.get_xaxis_transform())
-        mark.set_clip_on(False)
-        figure.legend([mark], ["failed"], loc="outside upper right", frameon=False)
+        look = {"marker": "x", "color": _style.BLACK, "transform": plot.get_xaxis_transform(), "clip_on": False}
+        marks.append(plot.scatter(crossed, foot, label="failed", **look))
+    if marks:
+        _style.legend_above(figure, marks, 2)
 
 
 def _map(drawn: _Shown, over: list[str]) -> None:
@@ -200,13 +199,13 @@ def _map(drawn: _Shown, over: list[str]) -> None:
             plot.plot(x[column], y[row], label=label, **BEST)
         else:
             plot.plot([], [], " ", label="no point within the limits")
+    elif shown.count():
+        label = f"{_value(data, metric, float(shown.max()))} at {shown.count()} of {shown.size} points"
+        plot.plot([], [], " ", label=label)
     hatched = [
         _hatch(plot, x, y, data[end.name].transpose(over[1], over[0]).values, end, i) for i, end in enumerate(ends)
     ]
-    if failed.any():
-        plot.patch.set(facecolor="0.95", edgecolor="0.75", hatch="///")
-        rows, columns = np.nonzero(failed)
-        plot.plot(x[columns], y[rows], "x", color=_style.BLACK, markersize=4.0, label="failed", clip_on=False)
+    _cross(plot, x, y, failed)
     _mark_present(plot, data, over, present, tuple(present.get(name, np.nan) for name in over))
     _style.dress(plot, _label(data, over[0]), _label(data, over[1]))
     plot.grid(False)
@@ -214,6 +213,15 @@ def _map(drawn: _Shown, over: list[str]) -> None:
     plot.set_ylim(y.min(), y.max())
     handles = [*plot.get_legend_handles_labels()[0], *hatched]
     _style.legend_above(figure, handles, 2)
+
+
+def _cross(plot: Axes, x: np.ndarray, y: np.ndarray, failed: np.ndarray) -> None:
+    """Crosses in a map where points failed, about which it is hatched."""
+    if failed.any():
+        plot.patch.set(facecolor="0.95", edgecolor="0.75", hatch="///")
+        rows, columns = np.nonzero(failed)
+        look: _style.Look = {"color": _style.BLACK, "markersize": _axes.small(rows.size), "clip_on": False}
+        plot.plot(x[columns], y[rows], "x", label="failed", **look)
 
 
 def _mark_present(
@@ -246,16 +254,22 @@ def _plane(shown: _Shown, against: str, over: list[str]) -> None:
     for across, up in zip(x, y, strict=True) if x.shape[1] > 1 else [(x[:, 0], y[:, 0])]:
         plot.plot(across, up, color="0.7", linewidth=0.8, zorder=1)
     shades = np.broadcast_to(data[over[0]].values[:, None], x.shape)
-    points = plot.scatter(x, y, 22.0, shades, cmap=ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.75, 256))))
-    _axes.label_axis(figure.colorbar(points, ax=plot).ax, "y", _label(data, over[0]))
+    look: _style.Look = {"cmap": ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.75, 256)))}
+    points = plot.scatter(x, y, 22.0, shades, vmin=shades.min(), vmax=shades.max(), **look)
+    if len(shades) > 1:
+        _axes.label_axis(figure.colorbar(points, ax=plot).ax, "y", _label(data, over[0]))
     handles = []
     if forbidden.any():
         label = "\n".join(end.label for end in ends)
-        handles += plot.plot(x[forbidden], y[forbidden], "x", color=_style.BAD, markersize=7.0, label=label)
+        size = 1.7 * _axes.small(int(forbidden.sum()))
+        handles += plot.plot(x[forbidden], y[forbidden], "x", color=_style.BAD, markersize=size, label=label)
+    if lost := int(np.sum(data["failed"])):
+        handles += plot.plot([], [], " ", label=f"{lost} of {x.size} points failed")
     allowed = np.isfinite(x) & np.isfinite(y) & ~forbidden
     best = _unbeaten(x[allowed], y[allowed])
-    look: _style.Look = _style.AFTER | {"linewidth": 1.2, "marker": "."}
-    handles += plot.plot(*best, label="no point is better in both", **look)
+    look = _style.AFTER | {"linewidth": 1.2, "marker": "."}
+    if best[0].size:
+        handles += plot.plot(*best, label="no point is better in both", **look)
     if metric in present and against in present:
         handles += plot.plot(present[metric], present[against], **PRESENT)
     _style.dress(plot, _label(data, metric), _label(data, against))

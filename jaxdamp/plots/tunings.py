@@ -117,6 +117,7 @@ def _spectrum(axes: Axes, channel: str, unit: str, pair: Sequence[tuple[np.ndarr
     squared = f"({typeset_unit(unit)})²" if "/" in unit else f"{unit}²"
     _style.dress(axes, "frequency [Hz]", f"[{squared}/Hz]", title)
     _style.plain_log_axis(axes.xaxis)
+    _style.within_six_decades(axes)
     axes.set_xlim(*pair[0][0][[0, -1]])
     axes.legend(frameon=False)
 
@@ -180,7 +181,7 @@ def _points(axes: Axes, front: ParetoFront, x: str, y: str, marked: Mapping[str,
         handles += axes.plot(values[x], values[y], label=_style.in_words(name), linestyle="", zorder=4, **look)
     handles += _limits(axes, front, x, y)
     across_label, up_label = (_style.labelled(_style.metric_words(name), front.units[name]) for name in (x, y))
-    _style.dress(axes, across_label, up_label, f"Front of {len(front)} designs")
+    _style.dress(axes, across_label, up_label, f"Front of {len(front)} design{'s' * (len(front) > 1)}")
     return handles
 
 
