@@ -41,6 +41,14 @@ def test_first_sample_is_at_time_zero(heights):
     )
 
 
+def test_heights_above_sea_level_are_told_of_in_single_precision(heights):
+    from_profile(POSITION, 250.0 + heights)
+    with jax.enable_x64(False):
+        from_profile(POSITION, 5.0 + heights)
+        with pytest.warns(UserWarning, match=r"`height` reaches 250 m, .* rounds to 30 µm.* Subtract the height"):
+            from_profile(POSITION, 250.0 + heights)
+
+
 def test_tracks_are_columns(heights):
     road = from_profile(POSITION, np.column_stack([heights, -2.0 * heights]))
     height = road.height(POSITION)
