@@ -27,7 +27,7 @@ def check(command: str, given: Arguments) -> None:
         refuse_target(resuming.target_of(command, given), command, **again)
     if given.get("files") and given.get("each") is None:  # a line may have its records in folders inside
         find_files(given["files"], FOLDER_SUFFIXES)
-    for name in ("law", "start", "baseline"):
+    for name in ("law", "baseline"):
         if isinstance(given.get(name), Path):
             _check_law(command, name, given[name])
     if given.get("vehicle") is not None:

@@ -132,6 +132,7 @@ def explore(
     """Write a law as one page for the browser: sliders, loops, records and a ride, live and without a network.
 
     Arguments:
+        law: a law as JSON, such as best_law.json of jaxdamp fit.
         files: files with records to overlay, patterns, or folders.
         vehicle: a quarter car, see "jaxdamp vehicles"; or a file of one, *.json or *.toml.
         speed: of the vehicle [m/s].

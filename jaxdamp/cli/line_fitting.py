@@ -75,7 +75,7 @@ def _write_laws(folder: Path, table: ForceVelocityTable, kind: type[dampers.Tabl
     if not table.is_family:
         return f"best_law.json goes through the points of {table.name}."
     ends = f"{table.settings[0]} to {table.settings[-1]}"
-    return f"best_law.json holds settings {ends} as its command: jaxdamp tune --start finds the best one."
+    return f"best_law.json holds settings {ends} as its command: jaxdamp tune --law finds the best one."
 
 
 def _file_name(setting: str) -> str:

@@ -26,7 +26,7 @@ NOT_OFFERED = {  # arguments of library functions, and why
     "identify.fit_vehicle": {"solver": "an object of Python"},
     "simulation.simulate": {
         "engine": "an object of Python",
-        "start": "a ride begins at rest; --start is a law",
+        "start": "a ride begins at rest",
         "state": "for runs in pieces, of programs",
         "return_state": "for runs in pieces, of programs",
         "every": "the pictures and metrics need every instant",
@@ -58,8 +58,13 @@ NAMES = {  # of options that differ from the argument, by function or for all; t
     "identify.fit_vehicle start": "initial_motion",
 }
 ALIASES = {"--force": "--replace", "--metrics": "--metric"}  # names of before, which still work
-READ_NO_RECORDS = ("ride", "tune", "sweep", "export")
-ALIASES_OF = {command: {"--sign": "--show-sign"} for command in READ_NO_RECORDS}
+ALIASES_OF = {
+    "ride": {"--sign": "--show-sign", "--start": "--law"},
+    "tune": {"--sign": "--show-sign", "--start": "--law"},
+    "sweep": {"--sign": "--show-sign", "--start": "--law"},
+    "export": {"--sign": "--show-sign"},
+    "fit-vehicle": {"--start": "--law"},
+}
 SHORT = {"verbose": "-v"}
 
 
@@ -112,10 +117,9 @@ NAMES_OR_NUMBERS = Written(words.names_or_numbers, "NAME or NUMBER,...")  # of `
 
 SHARED = {  # help of the words that several commands take, unless the docstring of one says something else
     "files": "files with records (CSV, XLSX, MATLAB, TDMS, MDF4, Parquet), patterns, or folders.",
-    "law": "a law as JSON, such as best_law.json of jaxdamp fit.",
+    "law": "a law as JSON for the dampers, instead of the vehicle's own; seats and cabs keep theirs.",
     "vehicle": 'a published vehicle, see "jaxdamp vehicles"; or a file of one, *.json or *.toml.',
     "road": "iso:A to iso:H, bump:HEIGHT:LENGTH [m], or a file: *.crg, or text of position, height.",
-    "start": "a law as JSON for the dampers, instead of the vehicle's own; seats and cabs keep theirs.",
     "baseline": "another law to compare with, as JSON.",
     "report": "write the page to this file too: fit.html.",
     "group_by": 'setting of the manifest to divide the records by, or "command".',

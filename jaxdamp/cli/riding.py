@@ -16,7 +16,7 @@ from jaxdamp.cli.early import refuse_road
 from jaxdamp.cli.jobs import Output, job, with_step_warnings, write_tables
 from jaxdamp.cli.limits import unit_of
 from jaxdamp.cli.options import Call
-from jaxdamp.cli.vehicle_words import law_of, parse_vehicle, read_baseline, read_law, with_dampers_at
+from jaxdamp.cli.vehicle_words import given_law, law_of, parse_vehicle, read_baseline, with_dampers_at
 from jaxdamp.dampers import AbstractDamper, command_words
 from jaxdamp.report import Table, axles_sentence, notes_of, ride_report, ride_tables, ride_verdict
 from jaxdamp.roads import AbstractRoad, WhiteRoad
@@ -140,7 +140,7 @@ def ride(
     vehicle: str,
     road: str = "iso:C",
     *,
-    start: Path | None = None,
+    law: Path | None = None,
     command: float | None = None,
     driving: Driving,
     how: Annotated[Call, "simulation.simulate"],
@@ -150,16 +150,16 @@ def ride(
 ) -> None:
     """Ride on a road: metrics, comfort by ISO 2631-1 and pictures, beside a baseline.
 
-    The vehicle has its own dampers, or the law of --start. The channels over time, channels_*.csv, are in SI and
+    The vehicle has its own dampers, or the law given by --law. The channels over time, channels_*.csv, are in SI and
     positive in rebound whatever units and sign are shown.
 
     Arguments:
         command: what is set on the dampers, such as clicks or a coil current; that of their laws if left out.
         baseline: to compare with: another law, or another vehicle, as JSON.
     """
-    law, make = None if start is None else read_law("start", start), parse_vehicle(vehicle)
-    own, name = with_dampers_at(make(law), command), "vehicle" if law is None else "law"
-    cars = {name: controlling.of(own, law)}
+    damper = given_law(law)
+    own, name = with_dampers_at(parse_vehicle(vehicle)(damper), command), "vehicle" if damper is None else "law"
+    cars = {name: controlling.of(own, damper)}
     if baseline is not None or controlling.controller is not None:  # at its own command
         cars = {"baseline": own if baseline is None else read_baseline(baseline, own)} | cars
     (surface,), run = driving.over(road)
@@ -179,7 +179,7 @@ def ride(
         if axles:
             screen.say(axles)
         title = f"{vehicle} on {road} at {display().speed(driving.speed)}"
-        laws = {name: law for name, car in cars.items() if (law := law_of(car.passive)) is not None}
+        laws = {name: one for name, car in cars.items() if (one := law_of(car.passive)) is not None}
         with work.saving("Tables and channels") as draft:
             _write(draft, laws, responses)
             write_tables(draft, tables)

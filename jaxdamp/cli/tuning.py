@@ -23,7 +23,7 @@ from jaxdamp.cli.limits import axes_in_si, bounds_in_si, in_si
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.riding import Driving, at_commands, beyond_vehicles, unusual
 from jaxdamp.cli.signatures import Arguments
-from jaxdamp.cli.vehicle_words import parse_vehicle, read_baseline, read_law, with_dampers_at, write_laws
+from jaxdamp.cli.vehicle_words import given_law, parse_vehicle, read_baseline, with_dampers_at, write_laws
 from jaxdamp.cli.words import Axis, Limit
 from jaxdamp.control import Controlled
 from jaxdamp.dampers import Scheduled
@@ -90,7 +90,7 @@ def tune_command(
     vehicle: str,
     road: str,
     *,
-    start: Path | None = None,
+    law: Path | None = None,
     minimise: str = "comfort",
     search: Annotated[Call, "tune.minimise"],
     roads: int = 1,
@@ -114,11 +114,11 @@ def tune_command(
         roads: realisations of an iso road, driven side by side; their mean counts.
         baseline: to compare with: another law, or another tuning's vehicle.json, as JSON.
     """
-    law = None if start is None else read_law("start", start)
-    car = parse_vehicle(vehicle)(law)
+    damper = given_law(law)
+    car = parse_vehicle(vehicle)(damper)
     beside = None if baseline is None else read_baseline(baseline, car)
     surfaces, run = _realisations(road, driving, roads)
-    car = controlling.of(car, law)
+    car = controlling.of(car, damper)
     if controlling.controller is not None:
         search = replace(search, given={"over": ["policy.**"], **search.given})
     elif "over" not in search.given and (settings := _settings(car)):
@@ -209,7 +209,7 @@ def sweep_command(
     road: str,
     *,
     over: Mapping[str, Axis],
-    start: Path | None = None,
+    law: Path | None = None,
     metric: Sequence[str] = ("comfort", "travel", "grip"),
     limit: Mapping[str, Limit] | None = None,
     driving: Driving,
@@ -236,7 +236,7 @@ def sweep_command(
         block: compute this part of the sweep only, into a store; pip install 'jaxdamp[cluster]'.
     """
     store = output.store("sweep")
-    car = with_dampers_at(parse_vehicle(vehicle)(None if start is None else read_law("start", start)), command)
+    car = with_dampers_at(parse_vehicle(vehicle)(given_law(law)), command)
     (surface,), run = driving.over(road)
     white = isinstance(surface, WhiteRoad)
     stated, said = in_si(limit or {}, car, white=white)

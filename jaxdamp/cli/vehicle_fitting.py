@@ -15,7 +15,7 @@ from jaxdamp.cli.limits import bounds_in_si
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.records import decisions
 from jaxdamp.cli.signatures import Arguments
-from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, write_laws
+from jaxdamp.cli.vehicle_words import given_law, parse_vehicle, write_laws
 from jaxdamp.cli.words import Named
 from jaxdamp.dampers import CoulombFriction
 from jaxdamp.identify import Failure, VehicleComparison, VehicleFit, VehicleRung
@@ -33,7 +33,7 @@ def fit_vehicle(
     vehicle: str,
     files: Sequence[Path],
     *,
-    start: Path | None = None,
+    law: Path | None = None,
     reading: Annotated[Call, "bench.read_rides"],
     how: Annotated[Call, "identify.fit_vehicle"],
     guide: Sequence[Named] = (),
@@ -54,7 +54,7 @@ def fit_vehicle(
             coulomb, dahl (gives before it slides), or all. Drives are left out in turn, and one form is recommended.
     """
     forms = friction_forms(friction)
-    car = parse_vehicle(vehicle)(None if start is None else read_law("start", start))
+    car = parse_vehicle(vehicle)(given_law(law))
     _checks.one_of("initial_motion", how.given.get("start", "rest"), ("rest", "free"))
     with job(screen, "fit-vehicle", output, report) as work:
         with screen.stage("Reading the records"):

@@ -56,7 +56,7 @@ def parse_vehicle(word: str) -> MakeCar:
         _checks.one_of("vehicle", word, presets())
         return lambda law: presets()[word](damper=law)
     if path.suffix == ".json":
-        remedy = 'Or give a name, see "jaxdamp vehicles"; a law is put into one with --start.'
+        remedy = 'Or give a name, see "jaxdamp vehicles"; a law is put into one with --law.'
         car = read_module("vehicle", path, AbstractVehicle, "a vehicle", remedy)
         return lambda law: car if law is None else with_law(car, law)
     return _preset(word, read_vehicle(path))
@@ -67,8 +67,13 @@ def read_law(argument: str, path: Path) -> AbstractDamper:
     return read_module(argument, path, AbstractDamper, "a law", FROM_FIT)
 
 
+def given_law(path: Path | None) -> AbstractDamper | None:
+    """The law of the option --law, if it is given."""
+    return None if path is None else read_law("law", path)
+
+
 def read_baseline(path: Path, car: AbstractVehicle) -> AbstractVehicle:
-    """The vehicle of the option --baseline: this one with another law, as --start puts it in, or one of its kind."""
+    """The vehicle of the option --baseline: this one with another law, as --law puts it in, or one of its kind."""
     kinds, words = (AbstractDamper, type(car)), f"a law or a {type(car).__name__}"
     module = read_module("baseline", path, kinds, words, "`jaxdamp tune` writes law.json and vehicle.json.")
     return with_law(car, module) if isinstance(module, AbstractDamper) else module

@@ -50,7 +50,7 @@ def test_vehicles_are_listed_with_a_line_of_meaning() -> None:
             "--law --held-out --sign --force-sign --columns --units --sampling-rate --weighting --rig --out --replace",
         ),
         ("demo", "--out --seed --replace --debug"),
-        ("fit-vehicle", "--start --columns --road --reversed --over --sensor --guide --bench --rig --report --replace"),
+        ("fit-vehicle", "--law --columns --road --reversed --over --sensor --guide --bench --rig --report --replace"),
     ],
 )
 def test_help_of_a_command_names_its_options(command: str, options: str) -> None:

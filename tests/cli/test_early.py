@@ -36,7 +36,7 @@ def test_a_wrong_path_is_answered_without_jax(tmp_path: Path) -> None:
         "bench full": "Folder full holds no *.csv",
         "ride broken.json": "VEHICLE must be a vehicle as JSON, but is broken.json, which is no JSON: Expecting",
         "tune quarter_car_000 iso_C": "ROAD must be iso:CLASS, bump:HEIGHT:LENGTH or a file that is there",
-        "sweep quarter_car_000 iso:C --over damper.rate=1:2:3 --start x.json": "Option --start must be a file",
+        "sweep quarter_car_000 iso:C --over damper.rate=1:2:3 --law x.json": "Option --law must be a file",
         "report a.csv --manifest no.toml": "Option --manifest must be a file that is there, but is no.toml",
         "export no.json --to c": "LAW must be a file that is there, but is no.json",
         "ride full/best_law.json": "Did you mean full/setting_1/best_law.json?",

@@ -59,7 +59,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 def fitted(files: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """The folder of a fit of the sweep, and what the command said."""
     out = tmp_path_factory.mktemp("fitted") / "out"
-    words = ["--start", files["law.json"], *COLUMNS, *FREE, *COARSE, "--out", out, "--report", out.parent / "page.html"]
+    words = ["--law", files["law.json"], *COLUMNS, *FREE, *COARSE, "--out", out, "--report", out.parent / "page.html"]
     return out, jaxdamp("fit-vehicle", files["car.toml"], files["lab.csv"], *words).output
 
 
@@ -118,7 +118,7 @@ def test_bench_records_guides_and_two_records_in_one_fit(files: dict[str, Path],
     dyno = bench.VirtualDyno(CAR.damper, force_noise=10.0, gas_force=-80.0, sampling_rate=200.0)
     dyno.run([bench.SineTest(0.02, 1.0), bench.SineTest(0.02, 3.0)]).write(tmp_path / "bench")
     out = tmp_path / "out"
-    words = ["--start", files["law.json"], "--guide", "sprung:friction=25", "--bench", tmp_path / "bench"]
+    words = ["--law", files["law.json"], "--guide", "sprung:friction=25", "--bench", tmp_path / "bench"]
     words += [
         "--rig",
         "gas",
@@ -149,7 +149,7 @@ def test_forms_of_friction_are_compared_and_the_recommended_vehicle_is_written(
         how = {"duration": 3.0, "sampling_rate": 250.0, "finer": 4, "name": f"drive {seed}"}
         road = roads.iso8608("C", speed=20.0, seed=seed)
         identify.virtual_ride(rig, road, NOISE, **how).to_csv(tmp_path / f"{seed}.csv")
-    words = ["--start", files["law.json"], "--guide", "sprung:friction=25", "--friction", "none,coulomb"]
+    words = ["--law", files["law.json"], "--guide", "sprung:friction=25", "--friction", "none,coulomb"]
     free = "unsprung_mass,spring_rate,tyre_stiffness,damper.*_rate"
     words += ["--dt", "2e-3", "--over", free, "--out", tmp_path / "out"]
     shown = jaxdamp("fit-vehicle", files["car.toml"], tmp_path / "0.csv", tmp_path / "1.csv", *words).output

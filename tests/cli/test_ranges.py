@@ -32,7 +32,7 @@ def test_a_ride_beyond_the_range_is_said_in_table_report_and_words(tmp_path: Pat
     law, out = tmp_path / "law.json", tmp_path / "ride"
     to_json(with_fitted_range(Bilinear(2600.0, 1200.0), SLOW), law)
     words = ["half_car_002", "bump:0.05:4", "--speed", "16", "--duration", "2", "--dt", "0.002"]
-    text = " ".join(jaxdamp("ride", *words, "--start", law, "--out", out, "--verbose").output.split())
+    text = " ".join(jaxdamp("ride", *words, "--law", law, "--out", out, "--verbose").output.split())
     assert "Use of the dampers beside the records of their laws" in text and "law: front damper: velocity" in text
     rows = list(csv.DictReader((out / "range_use.csv").read_text().splitlines()))
     assert [(row["damper"], row["quantity"]) for row in rows] == [

@@ -36,7 +36,7 @@ def _written(law: AbstractDamper, path: Path) -> Path:
 def test_ride_compares_a_law_with_a_baseline(law: Path, tmp_path: Path) -> None:
     base, out = _written(Linear(1500.0), tmp_path / "base.json"), tmp_path / "ride"
     words = ["--speed", "57.6km/h", "--duration", "2 s", "--dt", "2ms", "--verbose", "--out", out]
-    text = jaxdamp("ride", "half_car_002", "bump:0.05:4", "--start", law, "--baseline", base, *words).output
+    text = jaxdamp("ride", "half_car_002", "bump:0.05:4", "--law", law, "--baseline", base, *words).output
     assert "Axles: rear axle 0.156 s behind the front (2.5 m at 16 m/s)." in text
     assert "rear axle 0.156 s" in (out / "report.html").read_text()
     assert "rms_pitch_acceleration" in text and "baseline" in text and "Comfort by ISO 2631-1" in text
@@ -58,7 +58,7 @@ def test_ride_compares_a_law_with_a_baseline(law: Path, tmp_path: Path) -> None:
 def test_a_ride_says_at_which_command_its_dampers_are(law: Path, tmp_path: Path) -> None:
     clicks = Scheduled((Linear(900.0), Linear(1500.0)), levels=[2.0, 10.0], command=2.0)
     words = ["ride", "quarter_car_000", "bump:0.05:4", "--duration", "1", "--out", tmp_path / "ride", "--command"]
-    start = ["--start", _written(clicks, tmp_path / "clicks.json")]
+    start = ["--law", _written(clicks, tmp_path / "clicks.json")]
     assert "law: at command 6 of 2 to 10." in jaxdamp(*words, "6", *start).output
     assert "at command 6 of 2 to 10" in (tmp_path / "ride" / "report.html").read_text()
     assert float(from_json(tmp_path / "ride" / "law.json").command) == 6.0
@@ -66,7 +66,7 @@ def test_a_ride_says_at_which_command_its_dampers_are(law: Path, tmp_path: Path)
     assert heading.startswith("time [s],") and "damper_force [N]" in heading and "sprung_acceleration [m/s²]" in heading
     assert float(last.split(",")[0]) == pytest.approx(1.0)
     assert "--command must stay between the levels 2 and 10" in refused(tmp_path, *words, "20", *start, "--replace")
-    assert "--command must be left out beside a law" in refused(tmp_path, *words, "6", "--start", law, "--replace")
+    assert "--command must be left out beside a law" in refused(tmp_path, *words, "6", "--law", law, "--replace")
 
 
 @pytest.mark.parametrize(
@@ -86,7 +86,7 @@ def test_a_ride_says_at_which_command_its_dampers_are(law: Path, tmp_path: Path)
     ],
 )
 def test_wrong_words_are_refused(law: Path, tmp_path: Path, words: list[str], message: str) -> None:
-    assert message in refused(tmp_path, "ride", *words, "--start", law, "--out", tmp_path / "out")
+    assert message in refused(tmp_path, "ride", *words, "--law", law, "--out", tmp_path / "out")
 
 
 def test_a_controller_is_compared_with_the_law_at_its_own_command(tmp_path: Path) -> None:
@@ -94,7 +94,7 @@ def test_a_controller_is_compared_with_the_law_at_its_own_command(tmp_path: Path
     words = ["--controller", "skyhook:gain=3000,lead=0.01", "--delay", "0.002", "--actuator-lag", "0.003"]
     out = tmp_path / "ride"
     law = _written(damper, tmp_path / "law.json")
-    jaxdamp("ride", "quarter_car_000", "--start", law, "--duration", "0.5", *words, "--out", out)
+    jaxdamp("ride", "quarter_car_000", "--law", law, "--duration", "0.5", *words, "--out", out)
     rows = {row["metric"]: row for row in csv.DictReader((out / "metrics.csv").read_text().splitlines())}
     car, road = vehicles.presets.quarter_car_000(damper), roads.iso8608("C", 20.0, 0.5, seed=0)
     controlled = Controlled(car, Skyhook(3000.0, 0.01), actuator_lag=0.003, delay=0.002)
@@ -106,7 +106,7 @@ def test_a_controller_is_compared_with_the_law_at_its_own_command(tmp_path: Path
     assert "p->policy_gain = 3000.0;" in (tmp_path / "ecu.c").read_text()
     with pytest.raises(AssertionError, match=r"that takes one, but is .* beside Linear"):
         linear = _written(Linear(1500.0), tmp_path / "linear.json")
-        jaxdamp("ride", "quarter_car_000", "--start", linear, *words, "--out", tmp_path / "other")
+        jaxdamp("ride", "quarter_car_000", "--law", linear, *words, "--out", tmp_path / "other")
 
 
 def test_a_vehicle_rides_on_its_own_dampers_beside_another_one(tmp_path: Path) -> None:

@@ -35,7 +35,7 @@ def test_a_sheet_becomes_a_family_and_a_best_click(sheet: Path, monkeypatch: pyt
         and (folder / "fit/laws/3.json").is_file()
     )
     draw_nothing(monkeypatch)
-    ride = ("quarter_car_000", "iso:A", "--start", folder / "fit/best_law.json", "--duration", "1")
+    ride = ("quarter_car_000", "iso:A", "--law", folder / "fit/best_law.json", "--duration", "1")
     few = ("--fresh-roads", "2")
     said = " ".join(jaxdamp("tune", *ride, *few, "--limit", "grip=+20%", "--out", folder / "tune").output.split())
     assert (

@@ -184,7 +184,9 @@ def test_names_of_before_and_names_of_python_still_work(tmp_path: Path, monkeypa
     call = ("tune", "quarter_car_000", "white:C", "--bounds", "rate=3000:4000", "--out", tmp_path / "out")
     assert "must start between 3000 and 4000" in refused(tmp_path, *call)
     assert "Option --limit must read like" in refused(tmp_path, *call[:3], "--limits", "travel")
-    assert all(alias not in jaxdamp("tune", "--help").output for alias in ("--bounds", "--limits", "--force"))
+    assert "Option --law must be a file that is there" in refused(tmp_path, *call[:3], "--start", "none.json")
+    shown = jaxdamp("tune", "--help").output
+    assert all(alias not in shown for alias in ("--bounds", "--limits", "--force", "--start "))
 
 
 COMPOSED = (", or fit a law with settings", "add ", "with `jaxdamp")  # of parts that only a run joins

@@ -40,7 +40,7 @@ def _toml(folder: Path, text: str) -> Path:
 def test_tune_writes_a_better_law(law: Path, tmp_path: Path) -> None:
     out = tmp_path / "tuned"
     words = [
-        "--start",
+        "--law",
         law,
         "--minimise",
         "rms_sprung_acceleration",
@@ -167,12 +167,12 @@ WRONG = [
     (["tune", "car.json", "white:C"], "VEHICLE must be a file that is there"),
     (["tune", "CSV", "white:C"], "VEHICLE must be one of"),
     (["ride", "quarter_car"], "VEHICLE must be one of"),
-    (["ride", "LAW"], "a law is put into one with --start."),
-    (["ride", "quarter_car_000", "--start", "CSV"], "Option --start must be a law as JSON, but is {CSV}"),
+    (["ride", "LAW"], "a law is put into one with --law."),
+    (["ride", "quarter_car_000", "--law", "CSV"], "Option --law must be a law as JSON, but is {CSV}"),
     (["ride", "none.json"], "VEHICLE must be a file that is there, but is none.json"),
     (["ride", "quarter_car_000", "--baseline", "CSV"], "Option --baseline must be a law or a vehicle as"),
-    (["tune", "quarter_car_000", "white:C", "--start", "CSV"], "`jaxdamp fit` writes best_law.json"),
-    (["tune", "quarter_car_000", "white:C", "--start", "CAR"], "Option --start must be a law as JSON, but is a Quart"),
+    (["tune", "quarter_car_000", "white:C", "--law", "CSV"], "`jaxdamp fit` writes best_law.json"),
+    (["tune", "quarter_car_000", "white:C", "--law", "CAR"], "Option --law must be a law as JSON, but is a Quart"),
     (["tune", "quarter_car_000", "white:C", "--baseline", "CSV"], "Option --baseline must be a law or a vehicle as"),
     (["export", "CSV", "--to", "c"], "LAW must be a law or a vehicle as JSON, but is {CSV}"),
     (["tune", "LAW", "white:C"], "VEHICLE must be a vehicle as JSON, but is a Linear"),
@@ -186,7 +186,7 @@ WRONG = [
     (["tune", "quarter_car_000", "white:K"], "must be one of 'A'"),
     (["tune", "quarter_car_000", "grey:C"], "ROAD must be iso:CLASS"),
     (["tune", "quarter_car_000", "bump:3"], "bump:HEIGHT:LENGTH"),
-    (["tune", "quarter_car_000", "white:C", "--start", "none.json"], "Option --start must be a file that is there"),
+    (["tune", "quarter_car_000", "white:C", "--law", "none.json"], "Option --law must be a file that is there"),
     (["tune", "quarter_car_000", "white:C", "--minimise", "confort"], "Did you mean 'comfort'?"),
     (["tune", "quarter_car_000", "white:C", "--limit", "travel"], "Option --limit must read like NAME=VALUE"),
     (["tune", "quarter_car_000", "white:C", "--limit", "trawel=0.1"], "Did you mean 'travel'?"),
@@ -267,7 +267,7 @@ def test_a_limit_on_one_wheel_leaves_that_of_the_others() -> None:
 
 def _tied(folder: Path) -> list:
     to_json(Bilinear(2600.0, 1200.0), folder / "law.json")
-    return ["white:C", "--start", folder / "law.json", "--tie", "damper.compression_rate=damper.rebound_rate"]
+    return ["white:C", "--law", folder / "law.json", "--tie", "damper.compression_rate=damper.rebound_rate"]
 
 
 def test_parameters_that_differ_are_not_tied(tmp_path: Path) -> None:
