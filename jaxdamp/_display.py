@@ -201,10 +201,14 @@ def _figures(text: str) -> int:
     return max(3, len(re.sub(r"^[-−+]?0*\.?0*|\.|e.*", "", text)))
 
 
+_ROUNDING = 1e-8  # relative
+
+
 def rounded(value: float, error: float) -> tuple[str, str]:
     """A value and its standard error as text, with the significant digits.
 
-    The error has two digits, the value the digits down to the second digit of the error, but at least one.
+    The error has two digits, the value the digits down to the second digit of the error, but at least one. Errors of
+    the size of rounding, such as the scatter of equal numbers, are zero.
 
     Arguments:
         value: the number.
@@ -212,7 +216,11 @@ def rounded(value: float, error: float) -> tuple[str, str]:
 
     >>> rounded(14361.27, 61.8), rounded(0.9035, 0.2912), rounded(3.2, float("inf"))
     (('14361', '62'), ('0.90', '0.29'), ('3.2', 'inf'))
+    >>> rounded(0.0624512, 7e-18)
+    ('0.062451', '0')
     """
+    if error <= _ROUNDING * abs(value):
+        error = 0.0
     if not (np.isfinite(error) and np.isfinite(value) and error > 0):
         return f"{value:.5g}", f"{error:.2g}"
     place = int(np.floor(np.log10(error))) - 1

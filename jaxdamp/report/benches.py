@@ -1,10 +1,12 @@
 """Pages and sections on bench records without a law, on their ranges, and on a force-velocity table."""
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Unpack
 
+from jaxdamp._display import display
 from jaxdamp._settings import with_defaults
 from jaxdamp._tables import Cell, Column, Compared, Table, comparison_table, percent_change
 from jaxdamp.bench import BenchRun, Evaluation, ForceVelocityTable, LimitCheck, Preflight, evaluate
@@ -192,19 +194,20 @@ def bench_verdict(
 def _forces_in_words(evaluation: Evaluation, setting: str, velocity: float) -> str:
     """The forces of a setting at a velocity without gas force and zero error of the load cell, where these are known.
 
-    They would shift the ratio of rebound to compression.
+    They would shift the ratio of rebound to compression. Newtons, which the page shows in its unit, with its sign.
     """
+    sign = math.copysign(1.0, display().of("N", signed=True).factor)
     separated = evaluation.gas_and_friction.get(setting)
     static = 0.0 if separated is None else separated.gas_force
     forces = {}
     for side in ("rebound", "compression"):
         found = evaluation.get(f"{side} force", setting=setting, velocity=velocity)
-        shown = dataclasses.replace(found, value=found.value - static).cell
+        shown = dataclasses.replace(found, value=sign * (found.value - static)).cell
         forces |= {} if shown is None else {side: shown}
     words = " and ".join(f"{Column('').text(force)} N in {side}" for side, force in forces.items())
     if len(forces) == 2 and float(forces["compression"]):
         words += f", ratio {abs(float(forces['rebound']) / float(forces['compression'])):.2f}"
-    off = f", without the static force of {round(static)} N" if static else ", gas force included"
+    off = f", without the static force of {round(sign * static)} N" if static else ", gas force included"
     return words + off if words else ""
 
 

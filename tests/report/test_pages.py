@@ -257,3 +257,11 @@ def test_a_static_force_that_rounds_to_zero_has_no_sign() -> None:
     dyno = bench.VirtualDyno(Linear(1500.0), sampling_rate=500.0, gas_force=-0.3)
     (said_of_all,) = bench_verdict(bench.evaluate(dyno.run([SineTest(0.02, f) for f in (0.2, 2.0)])))
     assert said_of_all.endswith("without the static force of 0 N.")
+
+
+def test_the_forces_of_a_verdict_have_the_sign_that_is_shown() -> None:
+    dyno = bench.VirtualDyno(Linear(1500.0), sampling_rate=500.0, gas_force=-30.0)
+    found = bench.evaluate(dyno.run([SineTest(0.02, f) for f in (0.2, 2.0)]))
+    with shown_in(Display(sign="compression-positive")):
+        (words,) = bench_verdict(found)
+    assert re.search(r" -[\d.]+ ± [\d.]+ N in rebound and \d[\d.]+ ± ", words) and words.endswith(" force of 30 N.")
