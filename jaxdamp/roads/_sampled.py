@@ -14,8 +14,9 @@ from jaxdamp._types import Scalar, Signal, SignalLike
 from jaxdamp.roads.base import AbstractRoad, Columns, fade_in
 
 
-# How far outside the record a time may lie before it is refused, in samples: rounding must not count.
-_TOLERANCE = 1e-3
+def _tolerance(samples: Float[Array, "samples wheels"]) -> float:
+    """How far outside the record a time may lie before it is refused, in samples: rounding must not count."""
+    return 1e-3 + 4.0 * float(jnp.finfo(samples.dtype).eps) * samples.shape[0]
 
 
 def interpolate(
@@ -28,7 +29,8 @@ def interpolate(
         inside = None
         left = jnp.clip(jnp.floor(index).astype(int), 0, size - 1)
     else:
-        inside = (index >= -_TOLERANCE) & (index <= size - 1 + _TOLERANCE)
+        tolerance = _tolerance(samples)
+        inside = (index >= -tolerance) & (index <= size - 1 + tolerance)
         left = jnp.clip(jnp.floor(index).astype(int), 0, size - 2)
     fraction = (index - left.astype(index.dtype))[:, None]
     height = (1.0 - fraction) * samples[left] + fraction * samples[(left + 1) % size]
@@ -119,7 +121,8 @@ class SampledRoad(AbstractRoad):
         times, grid, duration = _checks.concrete(time), self.grid, self.duration
         if self.periodic or times is None or grid is None or duration is None or times.size == 0:
             return
-        if times.min() < -_TOLERANCE * grid or times.max() > duration + _TOLERANCE * grid:
+        tolerance = _tolerance(self.samples) * grid
+        if times.min() < -tolerance or times.max() > duration + tolerance:
             _checks.refuse(
                 "time",
                 f"stay within this road, which lasts from 0 to {duration:.6g} s",

@@ -121,6 +121,16 @@ def test_rounding_at_the_end_is_not_refused(heights):
     np.testing.assert_allclose(height[:, 0], heights[[0, -1]], atol=1e-8)
 
 
+def test_rounding_at_the_end_of_a_long_record_is_not_refused_in_single_precision(heights):
+    with jax.enable_x64(False):
+        road = from_profile(0.01 * np.arange(40_000), np.tile(heights, 100))
+        end = np.nextafter(np.float32(399.99), np.float32(400.0))
+        for height in (road.height, jax.jit(road.height)):
+            np.testing.assert_allclose(height(np.array([end]))[0, 0], heights[-1], rtol=0.05)
+        with pytest.raises(ValueError, match="`time` must stay within this road"):
+            road.height(np.array([400.0]))
+
+
 def test_traced_times_beyond_the_record_give_nan_and_only_they(heights):
     road = from_profile(POSITION, heights)
     height = eqx.filter_jit(road.height)(jnp.array([-1.0, 5.0, 19.95, 21.0]))[:, 0]
