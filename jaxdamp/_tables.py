@@ -206,7 +206,8 @@ class Table:
         for row in self.texts():
             parts = [_html_cell(*part, words=words) for part in zip(row, sides, named, strict=True)]
             lines.append(f"<tr>{''.join(parts)}</tr>")
-        caption = f"<caption>{html.escape(display().text(self.title))}</caption>"
+        title = display().text(self.title)
+        caption = f"<caption>{html.escape(said(title) if words else title)}</caption>"
         return "\n".join([f"<table>{caption}", f"<thead><tr>{head}</tr></thead><tbody>", *lines, "</tbody></table>"])
 
     _repr_html_ = to_html

@@ -9,6 +9,7 @@ from jaxdamp import _checks, plots
 from jaxdamp._settings import with_defaults
 from jaxdamp._tables import Compared, Table, comparison_table
 from jaxdamp._traced import equal
+from jaxdamp._words import said
 from jaxdamp.parameters import get
 from jaxdamp.report.page import PAGE, Page, Report
 from jaxdamp.simulation import Response, Ride
@@ -80,7 +81,7 @@ def add_tuning(
     rescored = result.fresh if rescored is None else rescored
     if rescored is not None:
         report.table(rescored.table())
-        report.text(elsewhere or rescored.summary)
+        report.text(said(elsewhere or rescored.summary))
     report.picture(lambda: plots.tuning(result), "Before and after the tuning", "tuning.png")
 
 

@@ -49,6 +49,13 @@ def test_numbers_in_sentences_are_rounded_as_they_are_shown():
         assert sentence == display().words(sentence) == "Smallest product: 132.6 lbf at a = 2600 lb, b = 0.5."
 
 
+def test_the_title_of_a_table_on_a_page_is_in_words():
+    data = jaxdamp.sweep(product, {"a": [1.0, 2.0], "b": [0.5]}).rename(product="rms_dynamic_tyre_load")
+    limited = points_table(data, {"rms_dynamic_tyre_load": 1.0})
+    assert "limits: tyre load variation, RMS ≤ 1</caption>" in limited.to_html(words=True)
+    assert "limits: rms_dynamic_tyre_load ≤ 1</caption>" in limited.to_html()
+
+
 @pytest.mark.parametrize("file", [None, "s.zarr"])
 def test_the_page_of_a_large_grid_has_its_first_points(tmp_path, file):
     axes = {name: np.linspace(1.0, 2.0, 11) for name in "abc"}
