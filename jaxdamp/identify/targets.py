@@ -223,6 +223,8 @@ def _judged(
     notes += [
         f"{t.name} is missed: {t.value:.4g} instead of {plus_minus(t.target, t.tolerance)}." for t in met if not t.met
     ]
+    if solution.starts == 1 and not all(t.met for t in met):
+        notes.append("Only one start was searched: others may meet the targets. Leave `starts` out for four.")
     notes += _disagreements(free, solution)
     how, main = fields_of_fit(problem, solution, noise, estimates), tuple(notes[:MOST_WARNINGS])
     return TargetFit(model=free.tree, targets=met, warnings=tuple(notes), main_warnings=main, **how)

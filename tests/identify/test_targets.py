@@ -88,7 +88,12 @@ def test_fewer_targets_than_numbers_move_what_they_must_and_say_so():
 def test_searches_leave_a_start_of_equal_zeros_where_the_derivatives_do_not_show_the_way():
     goals = {"sum": 3.0, "product": 2.0}
     start = {"a": 0.0, "b": 0.0}
-    result = identify.fit_targets(lambda p: {"sum": p["a"] + p["b"], "product": p["a"] * p["b"]}, start, goals)
+
+    def numbers(p):
+        return {"sum": p["a"] + p["b"], "product": p["a"] * p["b"]}
+
+    result = identify.fit_targets(numbers, start, goals)
+    assert "Only one start" in identify.fit_targets(numbers, start, goals, starts=1).warnings[-1]
     assert result.converged and all(target.met for target in result.targets)
     assert sorted(e.value for e in result.parameters) == pytest.approx([1.0, 2.0], rel=1e-4)
     square = identify.fit_targets(lambda p: {"square": p["a"] ** 2}, {"a": 0.0}, {"square": 4.0}, bounds={"a": (0, 9)})
