@@ -184,9 +184,14 @@ def _channels(dampers: Sequence[str], layout: Layout) -> list[Channel]:
     return commands + [Channel(f"{d}_demand", ChannelKind.FORCE, d, words.format(of[d])) for d in dampers]
 
 
-@compiled_quickly
 def _forces_at_levels(car: AbstractVehicle, velocity: Scalar) -> dict[str, Float[Array, "motions levels"]]:
     """Of each damper that takes a command, its forces at all levels, with the same states: at ± a velocity and fast."""
+    forces = _by_damper(car, velocity)
+    return {name: forces[name] for name in car.layout.ports if name in forces}  # JAX sorts them by name
+
+
+@compiled_quickly
+def _by_damper(car: AbstractVehicle, velocity: Scalar) -> dict[str, Float[Array, "motions levels"]]:
     forces = {}
     for name, law in zip(car.layout.ports, car.elements(), strict=True):
         if takes_command(law):

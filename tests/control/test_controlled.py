@@ -166,6 +166,14 @@ def test_dampers_have_policies_and_states_of_their_own():
     np.testing.assert_array_equal(part["rear_damper_command"], both["rear_damper_command"][500:])
 
 
+def test_commands_and_demands_are_those_of_their_damper():
+    seat = Seat((SeatMass(80.0, 6e3, DAMPER),), name="aft")  # before the damper of the wheel in the alphabet only
+    car = Controlled(QuarterCar(400.0, 50.0, 20e3, 250e3, DAMPER, seats=(seat,)), Skyhook())
+    assert car.layout.ports == car.system().control.dampers == ("damper", "aft_damper")
+    names = [f"{name}_{what}" for what in ("command", "demand") for name in car.layout.ports]
+    assert [channel.name for channel in car.layout.channels[-4:]] == names
+
+
 @pytest.mark.slow
 def test_the_body_is_what_stands_above_a_damper_also_on_seats_and_road_wheels():
     seat = Seat((SeatMass(80.0, 6e3, Scheduled((Linear(100.0), Linear(2000.0)), [0.0, 1.0], 0.0)),))
