@@ -206,6 +206,12 @@ def counts(**values: int | None) -> None:
             refuse(argument, "be 1 or more", value)
 
 
+def seed(value: int) -> None:
+    """Refuse a seed of NumPy's generators that is not a whole number from zero on."""
+    if not hasattr(value, "__index__") or np.ndim(value) or value < 0:
+        refuse("seed", "be a whole number, 0 or more", described(value))
+
+
 def part_of(argument: str, text: str) -> tuple[int, int]:
     """The number of a part, and of how many.
 

@@ -109,6 +109,7 @@ def posterior(evidence: Evidence, samples: int, warm_up: int, chains: int, seed:
     for name, count in (("samples", samples), ("warm_up", warm_up), ("chains", chains)):
         if count < 2:
             _checks.refuse(name, "be 2 or more", count)
+    _checks.seed(seed)
     potential, physical = _potential(evidence)
     begin = APART * np.random.default_rng(seed).uniform(-1.0, 1.0, (chains, evidence.minimum.values.size))
     if not bool(jnp.any(jax.vmap(potential)(jnp.asarray(begin)) < REFUSED)):

@@ -71,6 +71,7 @@ class Evidence(NamedTuple):
         if not np.all(np.isfinite(self.covariance)):
             remedy = "Freeze the parameters that do not change the force."
             _checks.refuse("samples", "be drawn from finite standard errors", "infinite for some parameters", remedy)
+        _checks.seed(seed)
         rng, free, dof = np.random.default_rng(seed), self.problem.free, self.noise.dof
         errors = np.sqrt(np.diag(self.covariance))
         scale = np.where(errors > 0, errors, 1.0)

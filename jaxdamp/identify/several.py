@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
+from jaxdamp import _checks
 from jaxdamp._status import Status
 from jaxdamp.dampers import Reach, keeps_conditions, laws_inside
 from jaxdamp.identify.estimates import Minimum
@@ -166,6 +167,7 @@ def scattered_starts(problem: Problem, first: SearchEnd, count: int, seed: int) 
     No factor moves a number from zero, where functions of several numbers are often symmetric: one is drawn at random,
     as large as changes the residuals by the size of the data, by the derivatives at the end of the first search.
     """
+    _checks.seed(seed)
     random, free = np.random.default_rng(seed), problem.free
     values, (lower, upper) = np.asarray(free.values, float), free.limits()
     sensitivity = np.linalg.norm(first.jacobian, axis=0)

@@ -58,6 +58,9 @@ def test_any_function_by_derivatives_and_by_samples(bilinear):
     )
     with pytest.raises(ValueError, match="`samples` must be 2 or more"):
         bilinear.propagate(ratio, samples=1)
+    for how in (lambda seed: bilinear.propagate(ratio, samples=2, seed=seed), lambda s: bilinear.posterior(seed=s)):
+        with pytest.raises(ValueError, match="`seed` must be a whole number, 0 or more, but is the number -1"):
+            how(-1)
 
 
 @pytest.mark.parametrize("samples", [None, 50])

@@ -111,6 +111,7 @@ def test_searches_leave_a_start_of_equal_zeros_where_the_derivatives_do_not_show
         ({"a": 1.0}, {"a": 2.0}, {"bounds": {"a": (2.0, 3.0)}}, "`a` must start between 2 and 3"),
         ({"a": 1.0, "b": 2.0}, {"a": 2.0}, {"freeze": ["b"], "priors": {"b": (1.0, 1.0)}}, "of b, which is frozen"),
         ({"a.b": 1.0}, {"a.b": 2.0}, {}, "names without a point"),
+        ({"a": 1.0}, {"a": 2.0}, {"seed": 0.5}, "`seed` must be a whole number, 0 or more"),
     ],
 )
 def test_wrong_targets_are_refused(start, targets, options, message):
