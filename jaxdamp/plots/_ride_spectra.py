@@ -28,7 +28,10 @@ _MM = 1e3
 
 
 def gains(axes: Sequence[Axes], shown: _rides.Rides) -> None:
-    """What reaches the body, its motion over that of the road, and the tyre load over its height."""
+    """What reaches the body, its motion over that of the road, and the tyre load over its height.
+
+    The legend is that of the dampers above.
+    """
     first, *_, last = default_channels(shown.cars[0].layout)
     channels = (first, last)
     if shown.responses is None and not isinstance(shown.road, WhiteRoad):
@@ -48,8 +51,6 @@ def gains(axes: Sequence[Axes], shown: _rides.Rides) -> None:
         panel.set_xlim(LOWEST, HIGHEST)
         _bands(panel, shown.frequencies)
     axes[0].axhline(1.0, color="0.6", linewidth=0.8, zorder=1)
-    if len(sides) > 1:
-        axes[0].legend(frameon=False, loc="upper right")
 
 
 def _gains(shown: _rides.Rides, number: int, channels: Sequence[str]) -> dict[str, tuple[np.ndarray, np.ndarray]]:

@@ -149,6 +149,7 @@ def at_width(figure: Figure, share: float) -> Iterator[Figure]:
     figure.set_size_inches(share * width, height)
     yield figure
     figure.set_size_inches(width, height)
+    figure.draw_without_rendering()  # ticks are chosen by the room of the last drawing
 
 
 def check_text(name: str, page: BboxBase, boxes: Printed) -> None:

@@ -46,6 +46,11 @@ def test_long_names_leave_room_for_curves(runs: BenchSet, responses: dict[str, R
     check_room(plots.ride({f"{LONG} {name}": one for name, one in responses.items()}, weighting="Wk"))
 
 
+def test_a_small_panel_of_a_sheet_has_no_legend_over_its_curves(figures: dict[str, Figure]) -> None:
+    (panel,) = [axes for axes in figures["ride sheet"].axes if axes.get_title(loc="left").startswith("Transmiss")]
+    assert panel.get_legend() is None and len(panel.get_lines()) >= 2
+
+
 def test_many_laws_and_frequencies_have_a_legend_within_the_page() -> None:
     laws = {f"law {number}": Linear(1000.0 + 50.0 * number) for number in range(60)}
     figure = plots.force_velocity(laws, np.linspace(-1.0, 1.0, 11))
