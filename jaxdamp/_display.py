@@ -165,7 +165,7 @@ class Display:
 
     def text(self, label: str) -> str:
         """The label of an axis or a table, with the unit in brackets and the words on the sign that are shown."""
-        return self._turned(re.sub(r"\[([^\[\]]+)\]", lambda found: f"[{self.of(found[1]).unit}]", label))
+        return self._turned(re.sub(r"\[([^\[\]]+)\]", lambda match: f"[{self.of(match[1]).unit}]", label))
 
     def words(self, sentence: str) -> str:
         """A sentence in the reader's words, with forces, velocities and lengths in the units that are shown."""
@@ -173,11 +173,11 @@ class Display:
         return self._turned(_AMOUNT.sub(self._amount, said) if self._system else said)
 
     def _turned(self, text: str) -> str:
-        return _SIGN_WORDS.sub(lambda found: _PHRASES[found[0]], text) if self.sign == COMPRESSION else text
+        return _SIGN_WORDS.sub(lambda match: _PHRASES[match[0]], text) if self.sign == COMPRESSION else text
 
-    def _amount(self, found: re.Match[str]) -> str:
+    def _amount(self, match: re.Match[str]) -> str:
         """Numbers with their unit as they are shown; a value beside its error has the digits that the error leaves."""
-        before, *pair, blank, unit = found.groups()
+        before, *pair, blank, unit = match.groups()
         shown, sign = self.of(unit), pair[1]
 
         def one(text: str) -> str:
@@ -193,7 +193,7 @@ class Display:
 
 def _plain(text: str) -> str:
     """A text with large numbers of a few digits written out: 1100 for 1.1e+03."""
-    return _EXPONENT.sub(lambda found: f"{float(found[0]):.12g}", text)
+    return _EXPONENT.sub(lambda match: f"{float(match[0]):.12g}", text)
 
 
 def _figures(text: str) -> int:
@@ -250,15 +250,15 @@ def _converted(unit: str, system: tuple[tuple[str, str], ...]) -> Shown:
     for side, text in enumerate(unit.split("/")):
         words = []
         for word in text.split():
-            found = _FACTOR.fullmatch(word.strip("()"))
-            if side > 1 or found is None:
+            match = _FACTOR.fullmatch(word.strip("()"))
+            if side > 1 or match is None:
                 return Shown(unit, 1.0)
-            base = "N" if found[1] == "kN" else found[1]
+            base = "N" if match[1] == "kN" else match[1]
             target = wanted.get(_KINDS.get(base, ""), base)
-            scale = _SI.get(base, 1.0) / _SI.get(target, 1.0) * (1e3 if found[1] == "kN" and target != "N" else 1.0)
-            name = found[1] if target == base else target
-            factor *= scale ** (float(found[2] or 1) * (1 - 2 * side))
-            words.append(word.replace(found[1], name, 1))
+            scale = _SI.get(base, 1.0) / _SI.get(target, 1.0) * (1e3 if match[1] == "kN" and target != "N" else 1.0)
+            name = match[1] if target == base else target
+            factor *= scale ** (float(match[2] or 1) * (1 - 2 * side))
+            words.append(word.replace(match[1], name, 1))
         pieces.append(words)
     return Shown("/".join(" ".join(words) for words in pieces), factor)
 

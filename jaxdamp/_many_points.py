@@ -84,16 +84,16 @@ def _judge_together(module: PyTree, start: str, below: Columns, reasons: np.ndar
         return
     left = np.flatnonzero(reasons == "")
     rows, places = np.unique(np.stack([c[left] for c in below.values()], axis=1), axis=0, return_inverse=True)
-    found = np.full(len(rows), "", dtype=object)
+    verdicts = np.full(len(rows), "", dtype=object)
     for i, row in enumerate(rows):
         changed = place.at(row)
         domains = {name: domain(changed) for name, domain in varying.items()}
         wrong = [name for name, domain in domains.items() if not domain.contains(np.asarray(get(changed, name)))]
         if wrong:
-            found[i] = f"{start}{wrong[0]} must be {domains[wrong[0]].name}"
+            verdicts[i] = f"{start}{wrong[0]} must be {domains[wrong[0]].name}"
         elif own is not None:
-            found[i] = _refusal(own, changed)
-    reasons[left] = found[places.ravel()]
+            verdicts[i] = _refusal(own, changed)
+    reasons[left] = verdicts[places.ravel()]
 
 
 def _refusal(check: Callable[[PyTree], object], module: PyTree) -> str:

@@ -84,5 +84,5 @@ def phi_functions(z: Inexact[Array, "n n"]) -> tuple[Inexact[Array, "n n"], ...]
         return tuple(jnp.where(number < count, new, old) for new, old in zip(twice, now, strict=True)), None
 
     start = (one + small @ held, held, ramp, bend)
-    found, _ = jax.lax.scan(double, start, jnp.arange(_HALVINGS, dtype=z.dtype))
-    return found
+    functions, _ = jax.lax.scan(double, start, jnp.arange(_HALVINGS, dtype=z.dtype))
+    return functions

@@ -36,8 +36,8 @@ class Shown(float):
         self.text = text
         return self
 
-    def __getnewargs__(self) -> tuple[float, str]:
-        return float(self), self.text  # of a copy
+    def __reduce__(self) -> tuple[type["Shown"], tuple[float, str]]:
+        return Shown, (float(self), self.text)  # of a copy
 
     def __format__(self, spec: str) -> str:
         return self.text

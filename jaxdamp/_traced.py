@@ -52,8 +52,8 @@ def look_behind(value: object) -> Behind | None:
 
 def behind(value: object) -> np.ndarray | None:
     """The value, or all values of a batch with the batch in front; None where no value is known yet."""
-    found = look_behind(value)
-    return None if found is None else found.value
+    batch = look_behind(value)
+    return None if batch is None else batch.value
 
 
 def is_traced(tree: PyTree) -> bool:
@@ -94,11 +94,11 @@ def known(tree: Tree) -> Tree | None:
     if not is_traced(tree):
         return tree
     arrays, rest = eqx.partition(tree, eqx.is_array)
-    found = [look_behind(leaf) for leaf in jax.tree.leaves(arrays)]
-    if any(leaf is None or leaf.batch_axes for leaf in found):
+    batches = [look_behind(leaf) for leaf in jax.tree.leaves(arrays)]
+    if any(leaf is None or leaf.batch_axes for leaf in batches):
         return None
     with at_compile_time():
-        values = [jnp.asarray(leaf.value) for leaf in found if leaf is not None]
+        values = [jnp.asarray(leaf.value) for leaf in batches if leaf is not None]
     return eqx.combine(jax.tree.unflatten(jax.tree.structure(arrays), values), rest)
 
 
@@ -113,10 +113,10 @@ def rows(tree: PyTree) -> list[np.ndarray] | None:
     if not is_batched(leaves):
         values = [behind(leaf) for leaf in leaves]
         return None if any(value is None for value in values) else [np.asarray(value)[None] for value in values]
-    found = look_behind(jnp.concatenate([jnp.ravel(jax.lax.stop_gradient(leaf)) for leaf in leaves]))
-    if found is None:
+    batch = look_behind(jnp.concatenate([jnp.ravel(jax.lax.stop_gradient(leaf)) for leaf in leaves]))
+    if batch is None:
         return None
-    flat = found.value.reshape(-1, found.value.shape[-1])
+    flat = batch.value.reshape(-1, batch.value.shape[-1])
     parts = np.split(flat, np.cumsum([leaf.size for leaf in leaves])[:-1], axis=1)
     return [part.reshape(-1, *leaf.shape).astype(leaf.dtype) for part, leaf in zip(parts, leaves, strict=True)]
 

@@ -85,34 +85,34 @@ def _differ(a: BenchRun, b: BenchRun) -> bool:
     return a.command != b.command or a.command_channel is not None or b.command_channel is not None
 
 
-def contradictions_in_words(found: Sequence[Contradiction]) -> list[str]:
+def contradictions_in_words(contradictions: Sequence[Contradiction]) -> list[str]:
     """A sentence on records that contradict each other, none if there are none.
 
     Arguments:
-        found: of `contradictions`.
+        contradictions: of `contradictions`.
     """
-    if not found:
+    if not contradictions:
         return []
-    pairs = pairs_in_words(found)
+    pairs = pairs_in_words(contradictions)
     return [
         f"Records of the same motion differ in force, so no law of the motion follows them all: {pairs}. Fit them"
         " apart, or state what was set on the damper (`command`) and fit a law that takes it."
     ]
 
 
-def pairs_in_words(found: Sequence[Contradiction]) -> str:
+def pairs_in_words(contradictions: Sequence[Contradiction]) -> str:
     """The worst pairs of records that contradict each other, with their differences.
 
     Arguments:
-        found: of `contradictions`, at least one.
+        contradictions: of `contradictions`, at least one.
     """
     pairs = "; ".join(
         (f"two records {pair.first}" if pair.first == pair.second else f"{pair.first} and {pair.second}")
         + f" by {pair.difference:.0f} N ({100 * pair.share:.0f} % of their RMS force"
         + (f", where the mean cycle of one is known to {pair.scatter:.2g} N)" if pair.scatter else ")")
-        for pair in found[:_NAMED]
+        for pair in contradictions[:_NAMED]
     )
-    return pairs + (f"; and {len(found) - _NAMED} pairs more" if len(found) > _NAMED else "")
+    return pairs + (f"; and {len(contradictions) - _NAMED} pairs more" if len(contradictions) > _NAMED else "")
 
 
 def same_motion(a: BenchRun, b: BenchRun) -> bool:

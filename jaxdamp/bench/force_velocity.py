@@ -204,8 +204,8 @@ def read_table(
                 raise ValueError(f"{file} is no force-velocity table, {what}: its columns are {there}.")
             for table in fitting:
                 stated.add(stated_sign(table))
-                found, said = sides_of(table, choice)
-                sides += found
+                two_sides, said = sides_of(table, choice)
+                sides += two_sides
                 notes += said
     problems.raise_any()
     sign = stated.pop() if sign is None and len(stated) == 1 else sign

@@ -124,24 +124,24 @@ def read_kinematics(
 
 def _columns(table: RawTable, chosen: Mapping[str, str | int]) -> dict[str, int]:
     """The columns of the wheel travel, and of the damper travel or else of the ratio."""
-    found = {role: given_column(table, role, wanted) for role, wanted in chosen.items()}
+    columns = {role: given_column(table, role, wanted) for role, wanted in chosen.items()}
     for index, name in enumerate(table.names):
         role = _role(table, index)
-        if role is None or index in found.values() or role in chosen:
+        if role is None or index in columns.values() or role in chosen:
             continue
-        if role in found:
+        if role in columns:
             choose = Setting("columns", {role: index})
-            both = f"{table.names[found[role]]!r} and {name!r}"
+            both = f"{table.names[columns[role]]!r} and {name!r}"
             raise ArgumentError(f"{table.where}: {both} could both be the {role}. Choose one: {choose}.", choose)
-        found[role] = index
-    found.pop("damper" if "ratio" in chosen or "damper" not in found else "ratio", None)  # one is enough
-    lacking = [role for role in ("wheel", "damper" if "ratio" not in found else "ratio") if role not in found]
+        columns[role] = index
+    columns.pop("damper" if "ratio" in chosen or "damper" not in columns else "ratio", None)  # one is enough
+    lacking = [role for role in ("wheel", "damper" if "ratio" not in columns else "ratio") if role not in columns]
     if lacking:
         choose = Setting("columns", dict.fromkeys(lacking, ...))
         what = " and ".join(f"the travel of the {role}" for role in lacking)
         there = ", ".join(map(repr, table.names))
         raise ArgumentError(f"{table.where} has no column for {what}: its columns are {there}. Pass {choose}.", choose)
-    return found
+    return columns
 
 
 def _words(text: str) -> set[str]:

@@ -109,9 +109,9 @@ def layout_of(rows: Rows, delimiter: str) -> Layout | None:
 def _rows_of_one_width(rows: Rows, delimiter: str) -> tuple[list[list[str]], np.ndarray, np.ndarray]:
     """The rows with numbers that have the most frequent width, and which of their cells are numbers, and values."""
     chosen = []
-    found = _are_numbers([cell for _, cells in rows for cell in cells], delimiter)
+    numeric = _are_numbers([cell for _, cells in rows for cell in cells], delimiter)
     for _, cells in rows:
-        numbers = [*islice(found, len(cells))]
+        numbers = [*islice(numeric, len(cells))]
         if any(numbers):
             values = numbers if all(numbers) else [n or is_stamp(cell) for n, cell in zip(numbers, cells, strict=True)]
             if sum(values) >= min(2, len(cells)):

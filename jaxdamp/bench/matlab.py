@@ -79,8 +79,8 @@ def _text(value: object) -> str:
 def _texts(value: Untyped) -> list[str]:
     """The texts of a cell array, or of a matrix of characters; none for something else."""
     cells = list(value) if isinstance(value, np.ndarray) and value.dtype.kind == "U" and value.ndim == 1 else value
-    found = isinstance(cells, list) and any(isinstance(cell, str) for cell in cells)
-    return [_text(cell) for cell in cells] if found else []
+    has_text = isinstance(cells, list) and any(isinstance(cell, str) for cell in cells)
+    return [_text(cell) for cell in cells] if has_text else []
 
 
 def _elements(key: str, value: Untyped) -> list[tuple[str, Structure]]:
@@ -98,10 +98,10 @@ def _channels(
     file: Path, elements: Sequence[tuple[str, Structure]], may_be_matrix: bool
 ) -> tuple[list[RawColumn], list[str]]:
     """The channels of structures that are one each, and notes; none if any of them is something else."""
-    found = [_channel(file, place, element, may_be_matrix) for place, element in elements]
-    if not all(columns for columns, _ in found):
+    channels = [_channel(file, place, element, may_be_matrix) for place, element in elements]
+    if not all(columns for columns, _ in channels):
         return [], []
-    return [column for columns, _ in found for column in columns], [note for _, notes in found for note in notes]
+    return [column for columns, _ in channels for column in columns], [note for _, notes in channels for note in notes]
 
 
 def _channel(file: Path, place: str, fields: Structure, may_be_matrix: bool) -> tuple[list[RawColumn], list[str]]:
@@ -142,8 +142,8 @@ def _scaled(where: str, values: np.ndarray, fields: Structure) -> tuple[np.ndarr
 
 def _scalars(fields: Structure, keys: Sequence[str]) -> dict[str, float]:
     """The fields of these names, in any case, that are one number."""
-    found = {key: value for key, value in fields.items() if key.lower() in keys}
-    return {key: float(value) for key, value in found.items() if isinstance(value, int | float)}
+    scalars = {key: value for key, value in fields.items() if key.lower() in keys}
+    return {key: float(value) for key, value in scalars.items() if isinstance(value, int | float)}
 
 
 def _scales(key: str) -> bool:

@@ -217,12 +217,12 @@ def choose_cycles(run: "BenchRun", skip: int, last: int | None) -> "BenchRun":
     return _cut(run, part, note)
 
 
-def _subtract(run: "BenchRun", found: "GasAndFriction") -> "BenchRun":
+def _subtract(run: "BenchRun", forces: "GasAndFriction") -> "BenchRun":
     """Without gas force and friction; friction grows in proportion below the velocities it was measured at."""
-    friction = found.friction * np.clip(run.velocity / found.velocities[0], -1.0, 1.0)
-    force = run.force - found.static_force(run.stroke) - friction
-    gas = f"gas force {found.gas_force:.4g} N with {found.gas_rate:.4g} N/m"
-    note = f"{gas} and friction {found.friction:.4g} N subtracted, as measured on {found.record}"
+    friction = forces.friction * np.clip(run.velocity / forces.velocities[0], -1.0, 1.0)
+    force = run.force - forces.static_force(run.stroke) - friction
+    gas = f"gas force {forces.gas_force:.4g} N with {forces.gas_rate:.4g} N/m"
+    note = f"{gas} and friction {forces.friction:.4g} N subtracted, as measured on {forces.record}"
     return _noted(run, note, force=force)
 
 

@@ -82,15 +82,15 @@ def _with_channels(table: RawTable, other: RawTable, choice: Choice) -> RawTable
     clock, slow = _clock(table, choice), _clock(other, choice)
     roles = [role for role in _SLOW if is_record(other, choice, (role,)) and not is_record(table, choice, (role,))]
     indices = [index for role in roles if (index := _one(other, role, choice)) is not None]
-    found = [column for column in map(other.columns.__getitem__, indices) if not column.is_text]
-    if not found or clock is None or slow is None or not _covers(slow.instants, clock.instants):
+    channels = [column for column in map(other.columns.__getitem__, indices) if not column.is_text]
+    if not channels or clock is None or slow is None or not _covers(slow.instants, clock.instants):
         return None
-    names = " and ".join(repr(column.name) for column in found)
-    rest = [column.name for column in other.columns if column not in (*found, other.columns[slow.column])]
+    names = " and ".join(repr(column.name) for column in channels)
+    rest = [column.name for column in other.columns if column not in (*channels, other.columns[slow.column])]
     rate = 1.0 / np.median(np.diff(slow.instants))
     note = f"{names} brought from a clock of {rate:.4g} Hz onto that of the record by straight lines"
     note += f"; not used of that clock: {', '.join(rest)}" * bool(rest)
-    brought = _straight(slow.instants, clock.instants, found)
+    brought = _straight(slow.instants, clock.instants, channels)
     return replace(table, columns=(*table.columns, *brought), notes=(*table.notes, note))
 
 

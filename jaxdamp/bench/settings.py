@@ -154,12 +154,12 @@ def settings_in_name(name: str) -> dict[str, float]:
     >>> settings_in_name("run3_0.5A"), settings_in_name("C4 R6 hot"), settings_in_name("12clk"), settings_in_name("5mm")
     ({'current': 0.5}, {'compression_clicks': 4.0, 'rebound_clicks': 6.0}, {'clicks': 12.0}, {})
     """
-    found: dict[str, float] = {}
+    settings: dict[str, float] = {}
     for pattern, names in _IN_NAMES:
         match = re.search(pattern, name, re.IGNORECASE if "click" in pattern else 0)
         values = () if match is None else (float(text.replace(",", ".")) for text in match.groups())
-        found = dict(zip(names, values, strict=False)) | found
-    return found
+        settings = dict(zip(names, values, strict=False)) | settings
+    return settings
 
 
 def settings_in_names(names: Sequence[str]) -> tuple[dict[str, dict], dict[str, tuple[str, ...]]]:
@@ -168,10 +168,12 @@ def settings_in_names(names: Sequence[str]) -> tuple[dict[str, dict], dict[str, 
     A setting counts only if every one of several records states it, and not all the same.
     """
     stated = {name: settings_in_name(name) for name in names}
-    keys = [k for k in stated[names[0]] if all(k in found for found in stated.values())] if len(stated) > 1 else []
-    keys = [key for key in keys if len({found[key] for found in stated.values()}) > 1]
-    settings: dict[str, dict] = {name: {key: found[key] for key in keys} for name, found in stated.items()}
-    words = {name: ", ".join(f"{key} {value:g}" for key, value in found.items()) for name, found in settings.items()}
+    keys = [k for k in stated[names[0]] if all(k in in_name for in_name in stated.values())] if len(stated) > 1 else []
+    keys = [key for key in keys if len({in_name[key] for in_name in stated.values()}) > 1]
+    settings: dict[str, dict] = {name: {key: in_name[key] for key in keys} for name, in_name in stated.items()}
+    words = {
+        name: ", ".join(f"{key} {value:g}" for key, value in in_name.items()) for name, in_name in settings.items()
+    }
     return settings, {name: (f"by its name: {text}",) for name, text in words.items() if text}
 
 
@@ -231,11 +233,11 @@ def _stated(runs: Sequence[BenchRun]) -> list[tuple[str, dict[str, str]]]:
 
 def _in_names(runs: Sequence[BenchRun]) -> list[tuple[str, dict[str, str]]]:
     """The settings that all names state, one by one and together."""
-    found = {run.name: settings_in_name(run.name) for run in runs}
-    keys = [key for key in found[runs[0].name] if all(key in settings for settings in found.values())]
-    single = [(f"`{key}`", {name: f"{settings[key]:g}" for name, settings in found.items()}) for key in keys]
+    by_name = {run.name: settings_in_name(run.name) for run in runs}
+    keys = [key for key in by_name[runs[0].name] if all(key in settings for settings in by_name.values())]
+    single = [(f"`{key}`", {name: f"{settings[key]:g}" for name, settings in by_name.items()}) for key in keys]
     short = {key: key.removesuffix("_clicks") for key in keys}
-    words = {name: " ".join(f"{short[key]} {settings[key]:g}" for key in keys) for name, settings in found.items()}
+    words = {name: " ".join(f"{short[key]} {settings[key]:g}" for key in keys) for name, settings in by_name.items()}
     return [*single, *([(" and ".join(f"`{key}`" for key in keys), words)] if len(keys) > 1 else [])]
 
 

@@ -54,8 +54,8 @@ class Side(NamedTuple):
 
 def stated_sign(table: RawTable) -> str | None:
     """The direction that the comments of a table state, as those that the library writes do; None without one."""
-    found = re.search(r"velocity is positive in (extension|rebound|compression)", " ".join(table.preamble))
-    return None if found is None else f"{'compression' if found[1] == 'compression' else 'rebound'}-positive"
+    match = re.search(r"velocity is positive in (extension|rebound|compression)", " ".join(table.preamble))
+    return None if match is None else f"{'compression' if match[1] == 'compression' else 'rebound'}-positive"
 
 
 def is_force_velocity(table: RawTable, choice: Choice) -> bool:
@@ -102,13 +102,13 @@ def _direction_of_name(table: RawTable, velocity: Points) -> int:
 
 def _setting(text: str) -> str:
     """The setting that a header or a name states: its numbers, or its words but for force and direction."""
-    found = settings_in_name(text)
-    if len(found) == 1:
-        return f"{next(iter(found.values())):g}"
+    settings = settings_in_name(text)
+    if len(settings) == 1:
+        return f"{next(iter(settings.values())):g}"
     name, unit = split_header(text)
     tail = None if unit else tail_unit(name, "force")
     name = tail[0] if tail else name
-    if found:
+    if settings:
         spelled = rf"(?i)\b(?:{'|'.join(word for word in _REBOUND | _COMPRESSION if len(word) > 1)})\b"
         return re.sub(spelled, "", name).strip(" _-,:")
     words = [word for word in _words(name) if word not in _REBOUND | _COMPRESSION | _SETTING and role_of(word) is None]
@@ -147,7 +147,7 @@ def sides_of(table: RawTable, choice: Choice) -> tuple[list[Side], list[str]]:
     forces = [index for index in forces if index != clicks]
     words = _column_of_words(table, _DIRECTION, [at, *forces])
     velocity, unit = in_si(table, at, "velocity", choice)
-    units, found, problems, missing = {"velocity": unit}, [], Problems(), 0
+    units, sides, problems, missing = {"velocity": unit}, [], Problems(), 0
     of_name = _direction_of_name(table, velocity)
     for index in forces:
         with problems.collected(table.where):
@@ -165,11 +165,11 @@ def sides_of(table: RawTable, choice: Choice) -> tuple[list[Side], list[str]]:
             for setting in dict.fromkeys(settings.tolist()):
                 rows = there & (settings == setting)
                 channels = direction[rows], velocity[rows], force[rows]
-                found.append(Side(setting, *channels, where, table.file, of_header == 0 and words is None))
+                sides.append(Side(setting, *channels, where, table.file, of_header == 0 and words is None))
     problems.raise_any()
     read = ", ".join(f"{role} in {text}" for role, text in units.items())
     lost = [f"left out: {missing} cell{'s' * (missing > 1)} of velocity or force without a number"] * bool(missing)
-    return found, [f"a force-velocity table: {read}; brought to SI", *lost, *table.notes]
+    return sides, [f"a force-velocity table: {read}; brought to SI", *lost, *table.notes]
 
 
 def curves_of(sides: Sequence[Side], sign: str | None, half: str | None) -> tuple[tuple[Curve, ...], list[str]]:

@@ -189,8 +189,8 @@ def _choose(file: Path, top: list[tuple[int, str]], given: str | None) -> Layout
 def _grouped(top: list[tuple[int, str]]) -> str:
     """A sentence on the first cell with a decimal comma or thousands that its file cannot have."""
     cells = ((n, cell, d) for n, line in top for d in DELIMITERS if d != " " and d in line for cell in split(line, d))
-    found = ((n, cell) for n, cell, d in cells if GROUPED.fullmatch(cell) and not is_number(cell, d))
-    return next((f" Line {n} has {cell!r}, which is not read as a number: {PLAINLY}." for n, cell in found), "")
+    grouped = ((n, cell) for n, cell, d in cells if GROUPED.fullmatch(cell) and not is_number(cell, d))
+    return next((f" Line {n} has {cell!r}, which is not read as a number: {PLAINLY}." for n, cell in grouped), "")
 
 
 def _divides(delimiter: str, top: list[tuple[int, str]]) -> bool:

@@ -43,7 +43,7 @@ def bench_command(
         with screen.stage("Reading the records"):
             raw = reading.raw(files)
         screen.details(records_table(tuple(raw)))
-        sound, found = reading.checked(screen, raw)
+        sound, preflight = reading.checked(screen, raw)
         runs = reading.processed(sound)
         remarks = decisions(runs)
         screen.points(remarks)
@@ -65,8 +65,8 @@ def bench_command(
             screen.table(baseline_table(evaluation, beneath))
         with work.saving("Tables") as draft:
             more = {} if check is None else {"limits": check.table()}
-            write_tables(draft / "tables", {"preflight": found.table(), **tables, **more})
-        work.page(bench_report, evaluation, found, check, baseline=beneath, remarks=remarks)
+            write_tables(draft / "tables", {"preflight": preflight.table(), **tables, **more})
+        work.page(bench_report, evaluation, preflight, check, baseline=beneath, remarks=remarks)
     if check is not None and not check.passed:
         raise typer.Exit(1)
 

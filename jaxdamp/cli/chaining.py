@@ -179,8 +179,8 @@ def run_demo(screen: Screen, scenario: Scenario, output: Output) -> None:
         with work.saving("Laws and tables", f"the rides, the tuning, {fits.missing}") as draft:
             write_fits(draft, fits.comparison, runs, work.attempts)
             _write_truth(draft, truth, scenario, work.attempts)
-        found, remarks = bench.preflight(runs), _remarks(scenario, fits)
-        part = FitPart(fits.comparison, tuple(runs), sheets=False, preflight=found, remarks=remarks)
+        preflight, remarks = bench.preflight(runs), _remarks(scenario, fits)
+        part = FitPart(fits.comparison, tuple(runs), sheets=False, preflight=preflight, remarks=remarks)
         laws = part.begun(Attempts(message=message))
         rides = _rides(screen, scenario, fits)
         result = None if truth is None else _tuned(screen, truth, scenario)

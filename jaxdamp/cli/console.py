@@ -217,9 +217,9 @@ def showing(given: Mapping[str, Any], screen: Screen) -> Iterator[None]:
     stated = {key: given[f"show_{key}"] for key in KEYS if given.get(f"show_{key}")}
     sources = []
     for file in _files(given.get("files") or ()) if "show_units" in given else ():
-        found = _stated(file)
-        sources += [str(file)] if found.keys() - stated.keys() else []
-        stated = {**found, **stated}
+        from_file = _stated(file)
+        sources += [str(file)] if from_file.keys() - stated.keys() else []
+        stated = {**from_file, **stated}
     display = Display(**stated, wording=in_command_line)
     if display.described:
         where = f" (from {' and '.join(sources)})" if sources else ""

@@ -115,7 +115,7 @@ def fit(
     with job(screen, "fit", output, report, resume=resume) as work:
         with screen.stage("Reading the records"):
             raw = reading.raw(files) if table is None else records_of(screen, table)
-        sound, found = reading.checked(screen, raw, refuse=True, machine=options["rig"])
+        sound, preflight = reading.checked(screen, raw, refuse=True, machine=options["rig"])
         runs = reading.processed(sound)
         _, held = split(runs, held_out)
         groups, divided = grouped(runs, group_by)
@@ -128,7 +128,7 @@ def fit(
         if options["scheduled"] and cross_validate:
             remedy = "Records at each inner command are predicted without them anyway; --group-by command fits apart."
             _checks.refuse("cross_validate", "be left out where the records state several commands", "given", remedy)
-        Fits(work, names, options, found, remarks, cross_validate, beside).of_all(groups, held)
+        Fits(work, names, options, preflight, remarks, cross_validate, beside).of_all(groups, held)
 
 
 def _given(**options: object) -> list[str]:

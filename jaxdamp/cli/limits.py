@@ -18,18 +18,18 @@ GRAVITY = {"g": "g_0"}  # of accelerations, where it is no gram
 
 def in_si(limits: Mapping[str, Limit], car: AbstractVehicle, *, white: bool) -> tuple[dict[str, Limit], list[str]]:
     """Limits by short name or ride metric with their ends in SI; and what they are, where that is not as written."""
-    units, found, said = {m.name: m.unit(car.units) for m in car.ride_metrics}, dict[str, Limit](), list[str]()
+    units, limits_in_si, said = {m.name: m.unit(car.units) for m in car.ride_metrics}, dict[str, Limit](), list[str]()
     for word, span in limits.items():
         _checks.one_of("limit", word, car.metric_words)
         unit = units.get(car.goal_metrics(word, white=white)[0], "")
         ends = span if isinstance(span, tuple) else (None, span)
         si = (_in_si("limit", word, ends[0], unit), _in_si("limit", word, ends[1], unit))
-        found[word] = si if isinstance(span, tuple) else si[1]
+        limits_in_si[word] = si if isinstance(span, tuple) else si[1]
         shown, numbers = display().of(unit), [end for end in si if isinstance(end, float)]
         if numbers and (si != ends or shown.unit != unit):
             text = " to ".join(f"{shown(number):.4g}" for number in numbers)
             said.append(f"Limit of {word}: {text} {typeset_unit(shown.unit)}".rstrip())
-    return found, said
+    return limits_in_si, said
 
 
 def bounds_in_si(bounds: Mapping[str, tuple[Bound, Bound]], models: Iterable[object]) -> dict[str, tuple[Bound, ...]]:
@@ -47,14 +47,14 @@ def unit_of(name: str, names: Iterable[str], *models: object) -> str:
 
 def axes_in_si(over: Mapping[str, Axis], car: AbstractVehicle) -> dict[str, np.ndarray]:
     """The axes of a sweep by path, last part or pattern, in SI."""
-    found = dict[str, np.ndarray]()
+    axes = dict[str, np.ndarray]()
     for name, (values, written) in over.items():
         unit = unit_of(name, over, car) if written else ""
         factor = ratio(written, unit) if written else 1.0
         if factor is None:
             _checks.refuse("over", f"be in a unit of {name}, such as {unit or 'none'}", repr(written))
-        found[name] = factor * values
-    return found
+        axes[name] = factor * values
+    return axes
 
 
 def _in_si(option: str, word: str, end: Bound, unit: str) -> Bound:

@@ -86,13 +86,13 @@ def leaves(target: str) -> tuple[Leaf, ...]:
     """
     own = [leaf for leaf in _leaves(target) if leaf.argument.name != "screen"]
     names = {leaf.option for leaf in own if not leaf.argument.callee}
-    found = []
+    options = []
     for leaf in own:
         callee = leaf.argument.callee
         called = [inner for inner in _leaves(callee) if inner.argument.default is not REQUIRED] if callee else []
         placed = [inner._replace(path=(*leaf.path, *inner.path)) for inner in called if inner.option not in names]
-        found += placed if callee else [leaf]
-    return tuple(found)
+        options += placed if callee else [leaf]
+    return tuple(options)
 
 
 def offered(target: str) -> dict[Leaf, Written | type]:
@@ -225,7 +225,7 @@ def in_words(text: str) -> str:
     >>> in_words('gains of sensors: `{"force": "500 N/V"}`. More.')
     'Gains of sensors: force=500 N/V.'
     """
-    text = _LIMITS.sub(lambda found: f"{found[1]}={found[2]}:{found[3]}".upper(), text)
+    text = _LIMITS.sub(lambda match: f"{match[1]}={match[2]}:{match[3]}".upper(), text)
     text = _DICTIONARY.sub(_assignments, text)
     text = re.sub(r" \(see [^)]*\)", "", text)
     sentence = re.split(r"(?<=[\w\])`\"]{2})\.\s", f"{text} ")[0].strip().rstrip(".")
@@ -235,9 +235,9 @@ def in_words(text: str) -> str:
     return f"{text[:1].upper() if first.isalpha() else text[:1]}{text[1:]}." if text else ""
 
 
-def _assignments(found: re.Match[str]) -> str:
+def _assignments(match: re.Match[str]) -> str:
     try:
-        given = ast.literal_eval(found[0])
+        given = ast.literal_eval(match[0])
     except (ValueError, SyntaxError):
-        return found[0]
-    return ",".join(f"{name}={value}" for name, value in given.items()) if isinstance(given, dict) else found[0]
+        return match[0]
+    return ",".join(f"{name}={value}" for name, value in given.items()) if isinstance(given, dict) else match[0]

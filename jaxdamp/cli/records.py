@@ -87,34 +87,34 @@ class Reading:
         late = "delay" in self.steps.given or "delay" in machine
         answered = (() if self.keep_rest else _CUT_OFF) + (("delay",) if late else ())
         with screen.stage("Checking the records"):
-            found = bench.preflight(runs).without(answered)
-        self._show(screen, found)
+            preflight = bench.preflight(runs).without(answered)
+        self._show(screen, preflight)
         if self.keep_bad:
-            return runs, found
-        wrong = {name for finding in found.of("error") for name in finding.records}
+            return runs, preflight
+        wrong = {name for finding in preflight.of("error") for name in finding.records}
         sound = BenchSet((run for run in runs if run.name not in wrong), runs.left_out)
         keeping = "With --keep-bad, they are used as they are."
         if not len(sound):
-            raise ValueError(" ".join([*(finding.sentence for finding in found.of("error")), keeping]))
+            raise ValueError(" ".join([*(finding.sentence for finding in preflight.of("error")), keeping]))
         names = ", ".join(sorted(wrong))
         if wrong and refuse and not self.read.given.get("skip_bad"):
             skipping = f"With --skip-bad, records with an error are left out: {names}."
-            raise ValueError(f"{found.of('error')[0].sentence} {skipping} {keeping}")
+            raise ValueError(f"{preflight.of('error')[0].sentence} {skipping} {keeping}")
         if wrong:
             screen.points([f"left out, with an error: {names}"], style="red")
-        return sound, found
+        return sound, preflight
 
-    def _show(self, screen: Screen, found: Preflight) -> None:
+    def _show(self, screen: Screen, preflight: Preflight) -> None:
         """The worst findings, or all."""
-        sentences = found.sentences()
+        sentences = preflight.sentences()
         shown = sentences if screen.verbose else [text for text in sentences if not text.startswith("note")][:_LINES]
         if not shown:
             return
-        screen.heading(found.summary)
+        screen.heading(preflight.summary)
         for sentence in shown:
             screen.points([sentence], style=_COLOURS[sentence.split(",")[0]])
         if len(sentences) > len(shown):
-            kinds = dict.fromkeys(finding.name for finding in found.findings)
+            kinds = dict.fromkeys(finding.name for finding in preflight.findings)
             more = [kind for kind in kinds if not any(kind in text.split(":")[0] for text in shown)]
             screen.points([f"also {', '.join(more)}: --verbose prints all, the page has them"])
 

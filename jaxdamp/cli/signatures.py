@@ -146,11 +146,11 @@ def _items(module: str, table: ast.stmt) -> dict[str, object]:
     """What a table of defaults holds, those of the tables that it takes up too."""
     if not isinstance(table, ast.AnnAssign) or not isinstance(table.value, ast.Dict):
         return {}
-    found: dict[str, object] = {}
+    items: dict[str, object] = {}
     for key, value in zip(table.value.keys, table.value.values, strict=True):
         inner = {} if key else _items(*_find(module, ast.unparse(value)))
-        found |= {ast.literal_eval(key): _value(module, value)} if key else inner
-    return found
+        items |= {ast.literal_eval(key): _value(module, value)} if key else inner
+    return items
 
 
 def _argument(
@@ -200,9 +200,9 @@ def _value(module: str, node: ast.expr) -> object:
 def _texts(docstring: str) -> dict[str, str]:
     """What the sections on arguments and attributes say of each name."""
     parts = _SECTIONS.split(docstring)
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for title, body in zip(parts[1::2], parts[2::2], strict=True):
         if title in ("Arguments", "Attributes"):
             for names, text in _ENTRY.findall(body):
-                found |= dict.fromkeys((name.strip() for name in names.split(",")), " ".join(text.split()))
-    return found
+                texts |= dict.fromkeys((name.strip() for name in names.split(",")), " ".join(text.split()))
+    return texts

@@ -143,13 +143,13 @@ def sensor_words(given: Sequence[Named], rides: Sequence[RideRecord]) -> dict[st
     """The sensors of "stroke:offset,delay=0.001", by channel; of a channel named twice the numbers are put together."""
     channels = list(dict.fromkeys(channel for ride in rides for channel in ride.channels))
     numbers: dict[str, dict[str, float]] = {}
-    for pattern, found in given:
+    for pattern, stated in given:
         hits = [channel for channel in channels if fnmatchcase(channel, pattern)]
         if not hits:
             _checks.one_of("sensor", pattern, channels)
         for channel in hits:
-            numbers[channel] = numbers.get(channel, {}) | found
-    return {channel: Sensor(**found) for channel, found in numbers.items()}
+            numbers[channel] = numbers.get(channel, {}) | stated
+    return {channel: Sensor(**stated) for channel, stated in numbers.items()}
 
 
 def guide_words(body: str, numbers: Mapping[str, float], car: AbstractVehicle) -> tuple[Guide, list[str]]:
@@ -172,7 +172,7 @@ def bench_words(texts: Sequence[str], car: AbstractVehicle) -> dict[str, BenchSe
                 _checks.refuse("bench", f"name one of the laws {', '.join(known)}", repr(text), "Write LAW=FILE.")
             path, file = known[0], text
         files.setdefault(path, []).append(Path(file))
-    return {path: bench.read(found) for path, found in files.items()}
+    return {path: bench.read(paths) for path, paths in files.items()}
 
 
 def _write(folder: Path, result: VehicleFit) -> None:

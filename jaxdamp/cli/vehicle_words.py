@@ -101,10 +101,10 @@ def _preset(word: str, document: Contents) -> MakeCar:
 
 def _flat(values: Mapping[str, object], prefix: str = "") -> list[tuple[str, object]]:
     """Tables inside a table as paths: `[parameters.front] spring_rate = 2e4` is front.spring_rate."""
-    found = []
+    pairs = []
     for key, value in values.items():
-        found += _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else [(prefix + key, value)]
-    return found
+        pairs += _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else [(prefix + key, value)]
+    return pairs
 
 
 def with_law(vehicle: AbstractVehicle, law: AbstractDamper) -> AbstractVehicle:

@@ -110,9 +110,9 @@ def in_command_line(text: str) -> str:
     """A sentence of the library that names calls and arguments of Python, with options instead."""
     for python, words in CALLS.items():
         text = re.sub(python, words, text)
-    text = re.sub(r"Argument `([^`]+)`", lambda found: _argument(found[1]), text)
-    text = re.sub(r"`(\w+)=([^`]*)`", lambda found: _setting(found) or found[0], text)
-    return re.sub(r"`(\w+)`", lambda found: own_words().get(found[1], found[0]).removeprefix("Option "), text)
+    text = re.sub(r"Argument `([^`]+)`", lambda match: _argument(match[1]), text)
+    text = re.sub(r"`(\w+)=([^`]*)`", lambda match: _setting(match) or match[0], text)
+    return re.sub(r"`(\w+)`", lambda match: own_words().get(match[1], match[0]).removeprefix("Option "), text)
 
 
 def _argument(argument: str) -> str:
@@ -122,14 +122,14 @@ def _argument(argument: str) -> str:
     return f"{words}{' of ' * bool(bracket)}{item.rstrip(']')}"
 
 
-def _setting(found: re.Match[str]) -> str:
+def _setting(match: re.Match[str]) -> str:
     """An argument with its value as the running command is given it; empty if it has no such option."""
-    words = own_words().get(found[1], "")
+    words = own_words().get(match[1], "")
     try:
-        value = ast.literal_eval(found[2])
+        value = ast.literal_eval(match[2])
     except (SyntaxError, ValueError):
         value = ...
-    return option_text(Setting(found[1], value), words.removeprefix("Option ")) if words.startswith("Option ") else ""
+    return option_text(Setting(match[1], value), words.removeprefix("Option ")) if words.startswith("Option ") else ""
 
 
 def message(error: Exception) -> str:

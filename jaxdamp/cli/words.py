@@ -33,15 +33,15 @@ def pairs(option: str, texts: Sequence[str], like: str = "NAME=VALUE") -> list[t
     >>> pairs("columns", ["time=t,stroke=LVDT, FL"])
     [('time', 't'), ('stroke', 'LVDT, FL')]
     """
-    found: list[tuple[str, str]] = []
+    pairs: list[tuple[str, str]] = []
     for part in (part.strip() for text in texts for part in re.split(r",(?=\s*[^\s,=:]+\s*=)", text)):
         name, equals, value = (piece.strip() for piece in part.partition("="))
         if not equals or not name or not value:
             _checks.refuse(option, f"read like {like}", repr(part))
-        if name in (known for known, _ in found):
+        if name in (known for known, _ in pairs):
             _checks.refuse(option, "name each thing once", f"twice {name!r}")
-        found.append((name, value))
-    return found
+        pairs.append((name, value))
+    return pairs
 
 
 def column(text: str) -> str | int | None:
@@ -68,13 +68,13 @@ def named(
     """
 
     def read(option: str, given: Sequence[str]) -> dict[str, T]:
-        found = {}
+        values = {}
         for name, text in pairs(option, given, like):
             try:
-                found[name] = value(text)
+                values[name] = value(text)
             except ValueError:
                 _checks.refuse(option, must, repr(text))
-        return found
+        return values
 
     return read
 
@@ -184,10 +184,10 @@ def bound(text: str) -> tuple[Bound, Bound]:
     >>> bound("1000:4000"), bound("5 lbf s/in:25 lbf s/in"), bound("3")
     ((1000.0, 4000.0), ('5 lbf s/in', '25 lbf s/in'), (None, 3.0))
     """
-    found = limit(text)
-    if found is None or "%" in text:
+    span = limit(text)
+    if span is None or "%" in text:
         raise ValueError(text)
-    return found if isinstance(found, tuple) else (None, found)
+    return span if isinstance(span, tuple) else (None, span)
 
 
 def _end(text: str, with_unit: bool) -> Bound:
@@ -220,11 +220,11 @@ def axis(text: str) -> Axis:
 def axes(option: str, given: Sequence[str]) -> dict[str, Axis]:
     """The axes of a sweep by parameter, each of one value or more."""
     must = "read like NAME=FIRST:LAST:COUNT or NAME=A;B;C, each with its unit or all in SI"
-    found = named(axis, must)(option, given)
-    for name, (values, _) in found.items():
+    axes = named(axis, must)(option, given)
+    for name, (values, _) in axes.items():
         if not values.size:
             _checks.refuse(option, "have one value or more on each axis", name)
-    return found
+    return axes
 
 
 def named_numbers(known: Mapping[str, float | None], example: str) -> Callable[[str, Sequence[str]], list[Named]]:
@@ -244,7 +244,7 @@ def named_numbers(known: Mapping[str, float | None], example: str) -> Callable[[
         if not owner or not rest:
             must = "read like NAME:NUMBER=START,NUMBER=START"
             _checks.refuse(option, must, repr(text), f"Such as {example}.")
-        found: dict[str, float] = {}
+        numbers: dict[str, float] = {}
         for part in rest.split(","):
             name, equals, value = (piece.strip() for piece in part.partition("="))
             _checks.one_of(option, name, known)
@@ -254,7 +254,7 @@ def named_numbers(known: Mapping[str, float | None], example: str) -> Callable[[
                 number = None
             if number is None:
                 _checks.refuse(option, f"give a number for {name}", repr(text), f"Such as {example}.")
-            found[name] = number
-        return owner, found
+            numbers[name] = number
+        return owner, numbers
 
     return read

@@ -210,10 +210,14 @@ def compiler_for(architecture: int) -> Compiler:
     Raises:
         NotImplementedError: there is none; the message says what is installed.
     """
-    found, driver = compilers(), driver_version()
-    suiting = [c for c in found if architecture in c.architectures and (not driver or c.version[0] <= driver[0])]
+    installed_compilers, driver = compilers(), driver_version()
+    suiting = [
+        c for c in installed_compilers if architecture in c.architectures and (not driver or c.version[0] <= driver[0])
+    ]
     if not suiting:
-        installed = ", ".join(f"{c.version[0]}.{c.version[1]} (up to sm_{max(c.architectures)})" for c in found)
+        installed = ", ".join(
+            f"{c.version[0]}.{c.version[1]} (up to sm_{max(c.architectures)})" for c in installed_compilers
+        )
         here = f"installed: {installed}" if installed else "none is installed"
         for_driver = f" and a driver of CUDA {driver[0]}.{driver[1]}" if driver else ""
         raise NotImplementedError(

@@ -173,8 +173,8 @@ class Sensors(AbstractDeclared):
 
     def of_kind(self, kind: type[Kind]) -> dict[str, Kind]:
         """The sensors, or filters, of this kind by the name of their signal, in the order of the signals."""
-        found = {name: getattr(self, name, None) for name in Signals._fields}
-        return {name: one for name, one in found.items() if isinstance(one, kind)}
+        sensors = {name: getattr(self, name, None) for name in Signals._fields}
+        return {name: one for name, one in sensors.items() if isinstance(one, kind)}
 
 
 def noise_of(sensors: Sequence[Sensors | None], samples: Float[Array, " time"]) -> Noise | None:

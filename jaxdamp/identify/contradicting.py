@@ -34,13 +34,13 @@ def refuse_several_laws(model: Model, runs: Sequence[BenchRun], settings: FitSet
         refuse_contradicting(contradicting(model, runs), argument)
 
 
-def refuse_contradicting(found: Sequence[Contradiction], argument: str = "runs") -> None:
+def refuse_contradicting(contradictions: Sequence[Contradiction], argument: str = "runs") -> None:
     """Refuse to fit one law to records that contradict each other, if there are any."""
-    if not found:
+    if not contradictions:
         return
     remedy = (
         "If settings were mixed, state them as the `command` of the records and use `fit_scheduled`, or give each to "
         '`fit_many` as a damper of its own; `bad_records="keep"` pools them.'
     )
-    is_ = f"of the same motion with different forces: {pairs_in_words(found)}"
+    is_ = f"of the same motion with different forces: {pairs_in_words(contradictions)}"
     _checks.refuse(argument, "be records that one law can follow", is_, remedy)

@@ -197,14 +197,14 @@ def solve_by(
     if priors:
         solution = solution._replace(noise=float(priors[0].noise))  # which stays where nothing is left to explain
     rounds = 1 if loss == "squares" and not any(part.relative for part in priors) else ROUNDS
-    found = _in_rounds(problem, solution, solve, loss=loss, noise=noise, spread=spread, rounds=rounds)
+    result = _in_rounds(problem, solution, solve, loss=loss, noise=noise, spread=spread, rounds=rounds)
     if loss != "squares" or rounds == 1:
-        return found
-    return _without_its_own_noise(found, solve, noise, starts)
+        return result
+    return _without_its_own_noise(result, solve, noise, starts)
 
 
 def _without_its_own_noise(
-    found: tuple[Problem, Solution],
+    fitted: tuple[Problem, Solution],
     solve: Callable[[Problem, int | None], Solution],
     noise: Callable[[Problem, SearchEnd], Noise],
     starts: int | None,
@@ -213,11 +213,11 @@ def _without_its_own_noise(
 
     What a wrong prior makes a fit miss counts as noise, beside which it weighs the more.
     """
-    problem, beside = found[0], found[1].noise or 0.0
+    problem, beside = fitted[0], fitted[1].noise or 0.0
     alone = solve(problem.at_noise(NEXT_TO_NOTHING * beside), starts).best
     level = noise(problem, alone).level if alone.finite else np.inf
     if not level < QUIETER * beside or problem.is_rounding(alone.squares):
-        return found
+        return fitted
     weighed = problem.at_noise(level)
     return weighed, solve(weighed.started_at(alone.values), 1)._replace(noise=level)
 

@@ -52,70 +52,70 @@ def estimate(problem: Problem, solution: Solution, noise: Noise) -> Estimates:
     significantly from zero, and "at a bound" if the minimum is beyond. If a parameter is not identifiable or outside
     the records, or if another minimum is nearly as good, the errors of the other parameters are checked by `profile`.
     """
-    free, found = problem.free, solution.best
-    uncertain, variance = uncertainty(found.jacobian, found.residual, noise), noise.variance
-    large = large_changes(problem, found)
+    free, minimum = problem.free, solution.best
+    uncertain, variance = uncertainty(minimum.jacobian, minimum.residual, noise), noise.variance
+    large = large_changes(problem, minimum)
     of_start, sizes = _weakly_known(problem)
     large = np.where(of_start, sizes, large)
-    sides, minima = at_ends(problem.coordinates, found.values), minima_of(solution, free.names, variance)
+    sides, minima = at_ends(problem.coordinates, minimum.values), minima_of(solution, free.names, variance)
     errors = np.sqrt(np.diag(uncertain.covariance))
     numbers = ~problem.coordinates.ordered
     firm = numbers & ~of_start & (errors <= WEAK * large) & (sides == 0)
     spans = _spans(free, problem.reach)
-    doubt = np.any((np.abs(found.values) > spans) | (numbers & ~of_start & ~firm)) or any(
+    doubt = np.any((np.abs(minimum.values) > spans) | (numbers & ~of_start & ~firm)) or any(
         m.chi_square < NEARLY for m in minima[1:]
     )
     far = WEAK * large
     moved = Profile(errors, np.zeros(errors.shape, bool))
-    if not solution.closed_form and doubt and found.converged and not problem.is_rounding(found.squares):
-        moved = profile(problem, found, errors, far, firm, variance)
+    if not solution.closed_form and doubt and minimum.converged and not problem.is_rounding(minimum.squares):
+        moved = profile(problem, minimum, errors, far, firm, variance)
     lower, upper = free.limits()
     pressed = ~(np.abs(uncertain.unconstrained_step) < BOUND_Z_SCORE)
     at_zero = numbers & (sides < 0) & (lower == 0) & np.isinf(upper) & ~pressed
     undetermined = ~(moved.errors <= far) | moved.open_ended
     weak = np.where(sides != 0, at_zero | ~np.isfinite(errors), undetermined)
-    estimates = _estimates(problem, found, moved.errors, weak, sides != 0, noise.dof)
+    estimates = _estimates(problem, minimum, moved.errors, weak, sides != 0, noise.dof)
     if noise.systematic:
-        spreads = spread_over_parts(problem, found)
+        spreads = spread_over_parts(problem, minimum)
         estimates = tuple(e._replace(spread=max(s, e.standard_error)) for e, s in zip(estimates, spreads, strict=True))
-    directions = weak_directions(found.jacobian, float(np.sqrt(variance)), large, WEAK)
-    estimates, notes = on_identifiability(problem, found, estimates, directions)
+    directions = weak_directions(minimum.jacobian, float(np.sqrt(variance)), large, WEAK)
+    estimates, notes = on_identifiability(problem, minimum, estimates, directions)
     further = on_minima(minima, estimates) + on_reach(estimates, spans)
     summary = (*in_groups(estimates), *further)
     sure = np.array([not e.note for e in estimates])
-    ended = found.converged and not solution.closed_form and not problem.is_rounding(found.squares)
-    off = _off(found, noise, sides == 0, sure) if ended else np.zeros_like(sure)
+    ended = minimum.converged and not solution.closed_form and not problem.is_rounding(minimum.squares)
+    off = _off(minimum, noise, sides == 0, sure) if ended else np.zeros_like(sure)
     unsettled = tuple(np.array(free.names)[off])
     return Estimates(estimates, uncertain.covariance, minima, (*notes, *further), summary, unsettled)
 
 
 def _off(
-    found: SearchEnd, noise: Noise, inside: Bool[np.ndarray, " free"], sure: Bool[np.ndarray, " free"]
+    minimum: SearchEnd, noise: Noise, inside: Bool[np.ndarray, " free"], sure: Bool[np.ndarray, " free"]
 ) -> Bool[np.ndarray, " free"]:
     """Which sure numbers are far from where the derivatives place the minimum; all if none is, but the squares are.
 
     Those at ends of their ranges stay there.
     """
-    off, jacobian = np.zeros(inside.size, bool), found.jacobian[:, inside]
-    reachable = np.linalg.norm(orthonormal(jacobian).T @ found.residual)
+    off, jacobian = np.zeros(inside.size, bool), minimum.jacobian[:, inside]
+    reachable = np.linalg.norm(orthonormal(jacobian).T @ minimum.residual)
     if reachable > OFF * np.sqrt(noise.variance):  # no number is farther off than all together
-        off[inside] = np.abs(uncertainty(jacobian, found.residual, noise).unconstrained_step) > OFF
+        off[inside] = np.abs(uncertainty(jacobian, minimum.residual, noise).unconstrained_step) > OFF
         off &= sure
-        if not off.any() and reachable**2 > GAIN * found.squares:
+        if not off.any() and reachable**2 > GAIN * minimum.squares:
             return inside
     return off
 
 
-def undetermined(problem: Problem, found: SearchEnd) -> tuple[str, ...]:
+def undetermined(problem: Problem, minimum: SearchEnd) -> tuple[str, ...]:
     """The free numbers of the law that the records do not determine: all of them after a search without an end.
 
     As `estimate` judges it, but by the derivatives alone, without following a number to where the error rises.
     """
     free, of_law = problem.free, [not name.startswith(("rig.", "records.")) for name in problem.free.names]
-    if not found.finite:
+    if not minimum.finite:
         return tuple(np.array(free.names)[of_law])
-    covariance = uncertainty(found.jacobian, found.residual, noise_of(problem, found, None)).covariance
-    large = large_changes(problem, found)
+    covariance = uncertainty(minimum.jacobian, minimum.residual, noise_of(problem, minimum, None)).covariance
+    large = large_changes(problem, minimum)
     weak = ~(np.sqrt(np.diag(covariance)) <= WEAK * large)
     return tuple(name for name, open_end in zip(free.names, weak & of_law, strict=True) if open_end)
 
@@ -135,7 +135,7 @@ def _weakly_known(problem: Problem) -> tuple[Bool[np.ndarray, " free"], Float[np
 
 def _estimates(
     problem: Problem,
-    found: SearchEnd,
+    minimum: SearchEnd,
     errors: Float[np.ndarray, " free"],
     weak: Bool[np.ndarray, " free"],
     bound: Bool[np.ndarray, " free"],
@@ -147,7 +147,7 @@ def _estimates(
     begins = {START_PATH.format(i): run for i, run in enumerate(problem.runs)}
     rows = []
     for i, (name, p, tied) in enumerate(zip(free.names, free.owners, free.followers, strict=True)):
-        value, error = float(found.values[i]), float(errors[i])
+        value, error = float(minimum.values[i]), float(errors[i])
         interval = (max(value - reach * error, float(lower[i])), min(value + reach * error, float(upper[i])))
         note = "not identifiable" if weak[i] else "at a bound" if bound[i] else ""
         meaning = p.meaning
@@ -159,27 +159,27 @@ def _estimates(
     return tuple(rows)
 
 
-def large_changes(problem: Problem, found: SearchEnd) -> Float[np.ndarray, " free"]:
+def large_changes(problem: Problem, minimum: SearchEnd) -> Float[np.ndarray, " free"]:
     """A large change of each parameter: its value, or for parameters of either sign the change that moves F by its RMS.
 
     A knot may move as far as its nearest neighbour, or the end of the records: where its place is not known better, the
     slopes on both sides of it are equal to within their errors, and a curve without it describes the records as well.
     """
     (lower, upper), tiny = problem.free.limits(), np.finfo(float).tiny
-    sensitivity = np.linalg.norm(found.jacobian, axis=0) / problem.level  # of the force, relative to its RMS
+    sensitivity = np.linalg.norm(minimum.jacobian, axis=0) / problem.level  # of the force, relative to its RMS
     by_force = np.divide(1.0, sensitivity, out=np.full(sensitivity.shape, tiny), where=sensitivity > 0)
-    by_size = np.maximum(np.abs(found.values), tiny)
+    by_size = np.maximum(np.abs(minimum.values), tiny)
     return np.where(
-        problem.coordinates.ordered, _gaps(problem, found), np.where((lower < 0) & (upper > 0), by_force, by_size)
+        problem.coordinates.ordered, _gaps(problem, minimum), np.where((lower < 0) & (upper > 0), by_force, by_size)
     )
 
 
-def _gaps(problem: Problem, found: SearchEnd) -> Float[np.ndarray, " free"]:
+def _gaps(problem: Problem, minimum: SearchEnd) -> Float[np.ndarray, " free"]:
     """Distance of each number of an ordered vector from its nearest neighbour, at most the extent of the records."""
     gaps, begin = _spans(problem.free, problem.reach), 0
     for p in problem.free.chosen:
         here = slice(begin, begin + p.value.size)
-        steps = np.diff(found.values[here], prepend=-np.inf, append=np.inf)
+        steps = np.diff(minimum.values[here], prepend=-np.inf, append=np.inf)
         gaps[here], begin = np.minimum(gaps[here], np.minimum(steps[:-1], steps[1:])), here.stop
     return gaps
 
@@ -323,7 +323,7 @@ def _at_conditions(coordinates: Coordinates, values: Float[np.ndarray, " free"])
     """Parameters at a limit given by other parameters."""
     free = coordinates.free
     scales = {p.path: float(np.max(np.abs(np.asarray(p.value)))) or 1.0 for p in free.chosen}
-    found = set()
+    paths = set()
     for prefix, law in laws_inside(free.started_at(values).tree):
         if not law.has_conditions():
             continue
@@ -332,5 +332,5 @@ def _at_conditions(coordinates: Coordinates, values: Float[np.ndarray, " free"])
             path = prefix + condition.parameter
             margin = np.min(getattr(plain, condition.parameter) - condition.least)
             if path in scales and margin < AT_LIMIT * scales[path]:
-                found.add(path)
-    return found
+                paths.add(path)
+    return paths

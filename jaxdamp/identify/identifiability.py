@@ -61,13 +61,13 @@ class Effect(NamedTuple):
         return ""
 
 
-def effects(problem: Problem, found: SearchEnd) -> list[Effect | None]:
+def effects(problem: Problem, minimum: SearchEnd) -> list[Effect | None]:
     """Where each free number acts, `None` where it does not; everywhere if the records are not those of a bench."""
     if not all(isinstance(part, Batch) for part in problem.residuals):
-        return [Effect(1.0, (0.0, 0.0), 0.0)] * found.values.size
+        return [Effect(1.0, (0.0, 0.0), 0.0)] * minimum.values.size
     used = problem.used
     velocity = signals(problem.residuals, "velocity")[0][used]
-    return [_effect(column, velocity) for column in found.jacobian[used].T]
+    return [_effect(column, velocity) for column in minimum.jacobian[used].T]
 
 
 def _effect(column: Float[np.ndarray, " samples"], velocity: Float[np.ndarray, " samples"]) -> Effect | None:
@@ -82,7 +82,7 @@ def _effect(column: Float[np.ndarray, " samples"], velocity: Float[np.ndarray, "
 
 def on_identifiability(
     problem: Problem,
-    found: SearchEnd,
+    minimum: SearchEnd,
     estimates: Sequence[Estimate],
     directions: Sequence[Float[np.ndarray, " free"]],
 ) -> tuple[tuple[Estimate, ...], list[str]]:
@@ -90,7 +90,7 @@ def on_identifiability(
 
     Also on parameters at bounds, and on groups of which only a combination is identifiable by the `weak_directions`.
     """
-    shown, groups = effects(problem, found), _groups(estimates, directions)
+    shown, groups = effects(problem, minimum), _groups(estimates, directions)
     knots = problem.coordinates.ordered
     noted, notes = [], []
     for i, (e, effect) in enumerate(zip(estimates, shown, strict=True)):

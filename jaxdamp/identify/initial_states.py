@@ -201,7 +201,7 @@ def periodic_state(law: AbstractDamper, cycle: Cycle) -> tuple[State, Scalar]:
     setting, begin = (jax.lax.stop_gradient(law), cycle), law.initial_state()
     first = jax.lax.stop_gradient(begin)
     start = _a_cycle_later(first, setting)[0]
-    found = optx.fixed_point(
+    solution = optx.fixed_point(
         lambda state, setting: _a_cycle_later(state, setting)[0],
         _Extrapolation(),
         start,
@@ -210,7 +210,7 @@ def periodic_state(law: AbstractDamper, cycle: Cycle) -> tuple[State, Scalar]:
         adjoint=ImplicitDerivatives(),
         throw=False,
     )
-    state = jax.lax.stop_gradient(found.value)
+    state = jax.lax.stop_gradient(solution.value)
     _, slopes, error = jax.lax.stop_gradient(_linearised(state, setting))
     sums, last = _sums_of_powers(slopes)
     return state + sums @ (_a_cycle_later(state, (law, cycle))[0] - state) + last @ (begin - first), error

@@ -98,7 +98,7 @@ def left_out(problem: Problem, best: SearchEnd) -> list[str]:
         residual = named[-1].rest
     left, alike = _repeated(residual, records), _alike(residual, records)
     sure = SURE * float(residual @ residual) * np.sqrt(alike / residual.size)
-    static = [found.effect.name for found in named] == ["offset"]
+    static = [explained.effect.name for explained in named] == ["offset"]
     if (named and named[-1].effect.name in OF_LAW) or (
         not static and repeated > 0 and left > max(OF_THE_LAW * asked, sure)
     ):
@@ -110,7 +110,7 @@ def left_out(problem: Problem, best: SearchEnd) -> list[str]:
 
 def _to_explain(named: Sequence[_Named], repeated: float, records: Sequence[Record]) -> float:
     """What repeats that a machine has to explain: of several effects that shift the phase, that before the last."""
-    shifts = [i for i, found in enumerate(named) if found.effect.name in OF_PHASE]
+    shifts = [i for i, explained in enumerate(named) if explained.effect.name in OF_PHASE]
     return _repeated(named[shifts[-1] - 1].rest, records) if len(shifts) > 1 else repeated
 
 
@@ -121,7 +121,7 @@ def _percent(share: float) -> str:
 
 def _of_the_law(named: Sequence[_Named], left: float, memoryless: bool) -> str:
     """A sentence on what the law misses; a law with memory is not told to take another curve without."""
-    parts = [found.words.format("is") for found in named if found.effect.name not in OF_LAW]
+    parts = [explained.words.format("is") for explained in named if explained.effect.name not in OF_LAW]
     alike = f" (of the squared residual {', '.join(parts)})" * bool(parts)
     if named and named[-1].effect.name in OF_LAW:
         effect = named[-1].effect
@@ -163,27 +163,31 @@ def _search(
     effects = [*proportional(problem, records), *_late(records, residual, span)]
     numbers, named = span.shape[1], list[_Named]()
     while len(named) < MOST_EFFECTS:
-        late = {found.effect.name: float(found.sizes[0]) for found in named if found.effect.name in LATE}
-        found = _clearest([*effects, hysteresis(problem, records, late)], span, residual, records, squares, numbers)
-        if found is None or found.share < least:
+        late = {
+            explained.effect.name: float(explained.sizes[0]) for explained in named if explained.effect.name in LATE
+        }
+        explained = _clearest([*effects, hysteresis(problem, records, late)], span, residual, records, squares, numbers)
+        if explained is None or explained.share < least:
             break
-        if not named and _is_static(found):
+        if not named and _is_static(explained):
             constant = (_explained(e, span, residual, squares) for e in effects if e.name == "offset")
             return [one for one in constant if one is not None]
-        named.append(found)
-        effects = [effect for effect in effects if effect.name != found.effect.name]
-        residual, span = found.rest, found.span
-        if found.effect.name in OF_LAW:
+        named.append(explained)
+        effects = [effect for effect in effects if effect.name != explained.effect.name]
+        residual, span = explained.rest, explained.span
+        if explained.effect.name in OF_LAW:
             break
     return named
 
 
-def _is_static(found: _Named) -> bool:
+def _is_static(explained: _Named) -> bool:
     """Whether another curve is most of all a force at rest."""
-    if found.effect.at_rest is None:
+    if explained.effect.at_rest is None:
         return False
-    size = np.sqrt(np.mean((found.effect.signals @ found.sizes) ** 2) / np.mean(np.sum(found.effect.signals, 1) ** 2))
-    return bool(abs(float(found.effect.at_rest @ found.sizes)) > STATIC * size)
+    size = np.sqrt(
+        np.mean((explained.effect.signals @ explained.sizes) ** 2) / np.mean(np.sum(explained.effect.signals, 1) ** 2)
+    )
+    return bool(abs(float(explained.effect.at_rest @ explained.sizes)) > STATIC * size)
 
 
 def _late(records: Sequence[Record], residual: np.ndarray, span: np.ndarray) -> list[Pattern]:
@@ -194,10 +198,10 @@ def _late(records: Sequence[Record], residual: np.ndarray, span: np.ndarray) -> 
         for _ in range(REFINED):
             signals = column(records, lambda m, size=size, change=change: change(m, size) / size)
             effect = Pattern(name, signals, name == "delay", filled(words), remedy)
-            found = _explained(effect, span, residual, 1.0)
-            if found is None:
+            explained = _explained(effect, span, residual, 1.0)
+            if explained is None:
                 break
-            size = float(found.sizes[0])
+            size = float(explained.sizes[0])
         effects += [effect] if effect else []
     return effects
 
@@ -211,15 +215,15 @@ def _clearest(
     numbers: int,
 ) -> _Named | None:
     """The first effect in the order of the list that explains as much as any, within the noise."""
-    found = [named for effect in effects if (named := _explained(effect, span, residual, squares)) is not None]
-    if not found:
+    explained = [named for effect in effects if (named := _explained(effect, span, residual, squares)) is not None]
+    if not explained:
         return None
-    rests = np.array([max(float(one.rest @ one.rest), 1e-300) for one in found])
-    counts = np.array([one.span.shape[1] - span.shape[1] for one in found])
-    independent = residual.size / _alike(found[int(np.argmin(rests))].rest, records)
+    rests = np.array([max(float(one.rest @ one.rest), 1e-300) for one in explained])
+    counts = np.array([one.span.shape[1] - span.shape[1] for one in explained])
+    independent = residual.size / _alike(explained[int(np.argmin(rests))].rest, records)
     deviance = independent * np.log(rests) + PENALTY * np.log(max(independent, 2.0)) * counts
     chosen = int(np.argmax(deviance <= deviance.min() + AS_GOOD))
-    one, variance = found[chosen], rests[chosen] / residual.size * _alike(found[chosen].rest, records)
+    one, variance = explained[chosen], rests[chosen] / residual.size * _alike(explained[chosen].rest, records)
     statistic = one.share * squares / variance / counts[chosen]
     if one.share >= LEAST_SHARE:
         return one if statistic >= (LEAST_F_OF_LARGE if one.share >= LARGE_SHARE else LEAST_F) else None
@@ -263,15 +267,15 @@ def _mains(
     for k, (line, wave) in enumerate(waves):
         for j, (_, at, weight, motion, _) in enumerate(records):
             columns[at, k * len(records) + j] = weight * wave(2 * np.pi * line * motion.time)
-    found = _explained(Pattern("mains", columns, True, str, ""), span, residual, float(residual @ residual))
-    if found is None:
+    explained = _explained(Pattern("mains", columns, True, str, ""), span, residual, float(residual @ residual))
+    if explained is None:
         return [], residual, span
     size, mains = float(np.linalg.norm([size for size, _ in lines.values()])), max(lines.values())[1]
     sentence = (
-        f"{100 * found.share:.0f} % of the squared residual are the mains, {mains:.0f} Hz and multiples, of"
+        f"{100 * explained.share:.0f} % of the squared residual are the mains, {mains:.0f} Hz and multiples, of"
         f" {size:.3g} N: Mend the earthing, or filter: `process(low_pass={mains / 2:g})` if the motion allows it."
     )
-    return [sentence] * (found.share >= LEAST_SHARE), found.rest, found.span
+    return [sentence] * (explained.share >= LEAST_SHARE), explained.rest, explained.span
 
 
 def _jitter(problem: Problem, records: Sequence[Record], squares: float) -> list[str]:

@@ -285,14 +285,14 @@ def _baseline(baseline: int | Sequence[str], labels: Sequence[str]) -> np.ndarra
     places: dict[str, list[int]] = {}
     for i, label in enumerate(labels):
         places.setdefault(label, []).append(i)
-    found = []
+    charts = []
     for name in baseline:
         _checks.one_of("baseline", name, places)
         if len(places[name]) > 1:
             at = ", ".join(str(i + 1) for i in places[name])
             remedy = "Give labels that differ, or the number of dampers at the beginning."
             _checks.refuse("baseline", "name dampers whose label is theirs alone", f"{name!r}, of numbers {at}", remedy)
-        if places[name][0] in found:
+        if places[name][0] in charts:
             _checks.refuse("baseline", "name each damper once", f"{name!r} repeatedly", "Remove the repeated names.")
-        found += places[name]
-    return np.array(sorted(found))
+        charts += places[name]
+    return np.array(sorted(charts))

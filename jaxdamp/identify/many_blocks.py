@@ -185,17 +185,17 @@ def _checked_path(
 
 def _found(store: BlockStore, rows: np.ndarray, names: tuple[str, ...]) -> dict[str, Any]:
     """What a store holds of some dampers: fields of the result; those that were left out are named."""
-    found: dict[str, Any] = store.read(*OF_EACH, *NUMBERS, "steps", "status", "record_rmse", "reason")
-    found = {name: values[rows] for name, values in found.items()}
-    if not np.any(np.isfinite(found["bias"])):  # nobody asked for it
-        del found["bias"]
-    status = tuple(Status[text.upper()] if text else Status.LEFT_OUT for text in found["status"])
-    reasons = [str(reason) for reason in found.pop("reason")]
+    columns: dict[str, Any] = store.read(*OF_EACH, *NUMBERS, "steps", "status", "record_rmse", "reason")
+    columns = {name: values[rows] for name, values in columns.items()}
+    if not np.any(np.isfinite(columns["bias"])):  # nobody asked for it
+        del columns["bias"]
+    status = tuple(Status[text.upper()] if text else Status.LEFT_OUT for text in columns["status"])
+    reasons = [str(reason) for reason in columns.pop("reason")]
     warn_of_left_out([name for name, reason in zip(names, reasons, strict=True) if reason], len(names))
-    errors, without = zip(*map(_of_records, found["record_rmse"]), strict=True)
+    errors, without = zip(*map(_of_records, columns["record_rmse"]), strict=True)
     pending = ["its block is not done yet" * (s is Status.LEFT_OUT) for s in status]
     said = tuple(next(filter(None, words), "") for words in zip(reasons, without, pending, strict=True))
-    return found | {"status": status, "reasons": said, "record_rmse": errors}
+    return columns | {"status": status, "reasons": said, "record_rmse": errors}
 
 
 def _of_records(text: str) -> tuple[Float[np.ndarray, " records"], str]:

@@ -93,13 +93,13 @@ def independent(sigma: Float[np.ndarray, " samples"], used: Bool[np.ndarray, " s
     return Noise(sigma, (rows,), (np.ones(1),), 1.0, float(max(rows.size - free, 1))).with_sigma(sigma)
 
 
-def noise_of(problem: Problem, found: SearchEnd, force_noise: float | None) -> Noise:
+def noise_of(problem: Problem, minimum: SearchEnd, force_noise: float | None) -> Noise:
     """The noise of all residuals; that of records as `_noise_of_records`, that of priors at its level."""
     robust = problem.robust if force_noise is None else None
-    return _noise_of_records(problem, found, force_noise).of_loss(robust, problem.used)
+    return _noise_of_records(problem, minimum, force_noise).of_loss(robust, problem.used)
 
 
-def _noise_of_records(problem: Problem, found: SearchEnd, force_noise: float | None) -> Noise:
+def _noise_of_records(problem: Problem, minimum: SearchEnd, force_noise: float | None) -> Noise:
     """The noise in the residual of a fit.
 
     The residual of each record gets an autoregression (Yule-Walker), whose order minimises a criterion like Schwarz's
@@ -114,23 +114,23 @@ def _noise_of_records(problem: Problem, found: SearchEnd, force_noise: float | N
     """
     owner, used, sigma = problem.owner, problem.used, np.array(problem.sigma)
     records = tuple(np.flatnonzero(used & (owner == i)) for i in range(sigma.size))
-    parts = [found.residual[rows] for rows in records]
+    parts = [minimum.residual[rows] for rows in records]
     count = int(np.count_nonzero(used))
-    white = independent(np.ones(used.size), used, found.values.size)
+    white = independent(np.ones(used.size), used, minimum.values.size)
     if force_noise is not None:
         return white.with_sigma(np.where(used, force_noise / sigma[owner], 1.0))
-    correlations = [np.ones(1)] if problem.is_rounding(found.squares) else [autocorrelation(part) for part in parts]
+    correlations = [np.ones(1)] if problem.is_rounding(minimum.squares) else [autocorrelation(part) for part in parts]
     is_white = all(alike.size == 1 for alike in correlations)
     if is_white or repeats(problem, parts):
         each = problem.each or own_levels(problem.robust) or (is_white and levels_differ(problem, parts))
-        level = np.sqrt(count / white.dof) * _levels(found.residual, records, each)
+        level = np.sqrt(count / white.dof) * _levels(minimum.residual, records, each)
         if is_white:
             return white.with_sigma(level)
         counted = max(correlation_time([part for part in parts if part.size]), 1.0)
-        few = white._replace(dof=max(count / counted - found.values.size, 1.0), inflation=float(np.sqrt(counted)))
+        few = white._replace(dof=max(count / counted - minimum.values.size, 1.0), inflation=float(np.sqrt(counted)))
         return few._replace(systematic=True).with_sigma(np.sqrt(counted) * level)
-    noise = Noise(_levels(found.residual, records, True), records, tuple(correlations), 0.0, 1.0)
-    return _corrected(noise, orthonormal(np.where(used[:, None], found.jacobian, 0.0)))
+    noise = Noise(_levels(minimum.residual, records, True), records, tuple(correlations), 0.0, 1.0)
+    return _corrected(noise, orthonormal(np.where(used[:, None], minimum.jacobian, 0.0)))
 
 
 def own_levels(robust: Robust | None) -> bool:
@@ -276,7 +276,7 @@ def repeats(problem: Problem, residuals: Sequence[Float[np.ndarray, " _"]]) -> b
     return alike >= REPEATED * size
 
 
-def spread_over_parts(problem: Problem, found: SearchEnd) -> list[float]:
+def spread_over_parts(problem: Problem, minimum: SearchEnd) -> list[float]:
     """The standard error of each free number with what the law misses, by the jackknife.
 
     Without one part of the records, one Gauss-Newton step from the minimum gives the numbers θ₍b₎; their error is
@@ -285,15 +285,15 @@ def spread_over_parts(problem: Problem, found: SearchEnd) -> list[float]:
     larger error counts. It says how much the numbers depend on which motion was measured, not how far the law is from
     the damper.
     """
-    scaled, scale = unit_columns(found.jacobian)
+    scaled, scale = unit_columns(minimum.jacobian)
     part, record = np.full(problem.owner.size, -1), np.where(problem.used, problem.owner, -1)
     for i, run in enumerate(problem.runs):
         at = np.flatnonzero(record == i)
         cycle = 1.0 / (problem.sample_steps[i] * run.frequency) if run.frequency > 0 else float(at.size)
         part[at] = PARTS * i + (PARTS * (np.arange(at.size) % cycle) / max(cycle, 1.0)).astype(int).clip(0, PARTS - 1)
-    errors = [_jackknife(scaled, found.residual, part)]
+    errors = [_jackknife(scaled, minimum.residual, part)]
     if np.unique(record[record >= 0]).size >= FEWEST_RECORDS:
-        errors.append(_jackknife(scaled, found.residual, record))
+        errors.append(_jackknife(scaled, minimum.residual, record))
     return [float(error) for error in np.max(errors, axis=0) / scale]
 
 

@@ -48,7 +48,7 @@ class Profile(NamedTuple):
 
 def profile(
     problem: Problem,
-    found: SearchEnd,
+    minimum: SearchEnd,
     errors: Float[np.ndarray, " free"],
     far: Float[np.ndarray, " free"],
     chosen: Bool[np.ndarray, " free"],
@@ -61,21 +61,21 @@ def profile(
     d if there is hardly any increase.
     """
     wide, open_ended, left = errors.copy(), np.zeros(errors.shape, bool), MOST_STEPS
-    most = found.squares + CHI_SQUARE * variance  # the largest sum of squares of a parameter that still fits
-    level = float(np.sqrt(variance * found.residual.size / most))  # of a sample's noise, to which tolerances relate
+    most = minimum.squares + CHI_SQUARE * variance  # the largest sum of squares of a parameter that still fits
+    level = float(np.sqrt(variance * minimum.residual.size / most))  # of a sample's noise, to which tolerances relate
     solver = BoundedLevenbergMarquardt(tolerance=LOOSE * level, patience=PATIENCE)
     searches = Searches(problem, solver)
     sides = [(int(i), side) for i in np.flatnonzero(chosen & (errors > 0)) for side in (-1.0, 1.0)]
     for i, side in sides:
-        distance, end = np.sqrt(CHI_SQUARE) * errors[i], found
+        distance, end = np.sqrt(CHI_SQUARE) * errors[i], minimum
         farthest = max(far[i], distance)
         while distance <= farthest and left > 0:
-            moved = moved_to(searches, end, i, found.values[i] + side * distance, STEPS)
+            moved = moved_to(searches, end, i, minimum.values[i] + side * distance, STEPS)
             if moved is None:
                 break
             end = moved
             left -= end.steps
-            rise = (end.squares - found.squares) / variance
+            rise = (end.squares - minimum.squares) / variance
             if not rise < CHI_SQUARE:
                 break
             wide[i] = max(wide[i], distance / np.sqrt(max(rise, 1.0)))

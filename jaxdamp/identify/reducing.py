@@ -128,7 +128,7 @@ def reduced(rungs: Sequence[Rung], fitted: Fitted, progress: Callable[[str], Non
     """
     best = recommendation(rungs).rung
     judged = sorted(judged_on_held_out(rungs), key=lambda rung: rung.error)
-    near, floor, found = NEARLY * judged[0].error, best.floor, list[Rung]()
+    near, floor, simpler = NEARLY * judged[0].error, best.floor, list[Rung]()
     doubted = [rung for rung in judged if rung is not best and rung.error <= near and rung.doubt]
     sources = [best, *doubted] if best.doubt else [rung for rung in doubted[:1] if LOSS * rung.error < best.error]
     if len(rungs) < 2 or best.held_out_rmse is None:
@@ -136,10 +136,10 @@ def reduced(rungs: Sequence[Rung], fitted: Fitted, progress: Callable[[str], Non
     for source in sources[:MOST_LAWS]:
         progress(source.name)
         as_well = max(min(near, LOSS * source.error), floor)
-        found += _clearer(source, as_well, max(near, floor) if best.doubt else None, fitted, ahead)
-        if found and _by_doubt(found[-1]) <= (False, 0, as_well):
+        simpler += _clearer(source, as_well, max(near, floor) if best.doubt else None, fitted, ahead)
+        if simpler and _by_doubt(simpler[-1]) <= (False, 0, as_well):
             break
-    yield from sorted(found, key=_by_doubt)[:1]
+    yield from sorted(simpler, key=_by_doubt)[:1]
 
 
 def _clearer(source: Rung, enough: float, most: float | None, fitted: Fitted, ahead: Ahead) -> list[Rung]:

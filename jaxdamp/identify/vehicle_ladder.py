@@ -65,8 +65,8 @@ def friction_places(vehicle: AbstractVehicle) -> list[Place]:
         if not any(prefix.startswith(path) for path in outer):
             outer.append(prefix)
     places = [_place(path.removesuffix("."), get(vehicle, path.removesuffix("."))) for path in outer]
-    if found := [place for place in places if place.friction is not None]:
-        return found
+    if with_friction := [place for place in places if place.friction is not None]:
+        return with_friction
     dampers = [place for place in places if place.path.split(".")[-1].endswith("damper")]
     force = max((place.force for place in dampers), default=0.0)
     guides = vehicle.guides if isinstance(vehicle, Guided) else ()

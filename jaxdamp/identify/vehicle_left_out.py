@@ -109,12 +109,12 @@ def on_sensors(
                 if column is not None:
                     effects.append((channel, effect))
                     columns.append(column)
-    found = _regressed(problem, end, columns)
-    if found is None:
+    regression = _regressed(problem, end, columns)
+    if regression is None:
         return []
-    chosen = [effect for effect, own in zip(effects, found.shown, strict=True) if own]
+    chosen = [effect for effect, own in zip(effects, regression.shown, strict=True) if own]
     sentences = []
-    for (channel, effect), size, error in zip(chosen, map(float, found.sizes), found.errors, strict=True):
+    for (channel, effect), size, error in zip(chosen, map(float, regression.sizes), regression.errors, strict=True):
         values = np.concatenate([record[channel] for record in records if channel in record.channels])
         unit = {"delay": records[0].dt, "offset": 0.1 * float(np.std(values)), "gain": 0.1}[effect]
         if abs(size) > max(SURE * error, NOTICEABLE * unit):
@@ -126,11 +126,11 @@ def _column(
     problem: Problem, end: SearchEnd, records: Sequence[RideRecord], channel: str, effect: str
 ) -> Float[np.ndarray, " samples"] | None:
     """Change of the weighted residual for each unit of an effect; None for a law on a bench."""
-    columns, found = np.zeros_like(end.residual), False
+    columns, any_column = np.zeros_like(end.residual), False
     for (part, column), (_, residual) in zip(problem.by_part(columns), problem.by_part(end.residual), strict=True):
         if isinstance(part, RideBatch) and channel in part.channels:
             weight = np.asarray(part.weight)
-            row, shaped, found = part.channels.index(channel), column.reshape(weight.shape), True
+            row, shaped, any_column = part.channels.index(channel), column.reshape(weight.shape), True
             errors = residual.reshape(weight.shape)
             for i, number in enumerate(np.asarray(part.number)):
                 counts = weight[i, row] > 0
@@ -139,7 +139,7 @@ def _column(
                 slope = np.gradient(expected, records[number].dt)
                 by_effect = {"delay": slope, "offset": -np.ones_like(slope), "gain": -expected}
                 shaped[i, row] = weight[i, row] * by_effect[effect]
-    return columns if found else None
+    return columns if any_column else None
 
 
 def _sentence(channel: str, effect: str, size: float, unit: str) -> str:
@@ -225,11 +225,11 @@ def _friction(problem: Problem, end: SearchEnd, places: Sequence[Place], give: f
     for place in places:
         changed = with_laws(model.vehicle, [place], [place.with_form(form, give)])
         changes.append(_residual(problem, dataclasses.replace(model, vehicle=changed)) - end.residual)
-    found = _regressed(problem, end, changes)
-    sure = [] if found is None else np.flatnonzero(found.shown)[-found.sizes > SURE * found.errors]
-    if found is None or not len(sure):
+    regression = _regressed(problem, end, changes)
+    sure = [] if regression is None else np.flatnonzero(regression.shown)[-regression.sizes > SURE * regression.errors]
+    if regression is None or not len(sure):
         return None
-    return Friction(tuple(places[i] for i in sure), give, found.left, np.stack(changes, axis=1)[:, sure])
+    return Friction(tuple(places[i] for i in sure), give, regression.left, np.stack(changes, axis=1)[:, sure])
 
 
 def _residual(problem: Problem, model: VehicleTest) -> Float[np.ndarray, " samples"]:

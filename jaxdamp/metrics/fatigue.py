@@ -81,8 +81,8 @@ def rainflow_cycles(signal: VectorLike) -> RainflowCycles:
 
     if load.size == 2:  # the package counts nothing of two samples
         load = np.linspace(load[0], load[1], 3)
-    found = np.array([cycle[:3] for cycle in rainflow.extract_cycles(load.tolist())], float).reshape(-1, 3)
-    return RainflowCycles(0.5 * found[:, 0], found[:, 1], found[:, 2])
+    cycles = np.array([cycle[:3] for cycle in rainflow.extract_cycles(load.tolist())], float).reshape(-1, 3)
+    return RainflowCycles(0.5 * cycles[:, 0], cycles[:, 1], cycles[:, 2])
 
 
 def spectral_moments(

@@ -58,8 +58,8 @@ def resolve_ties(known: Sequence[Parameter], tie: Mapping[str, str] | None, *, m
 def _wildcards(pattern: str, path: str) -> tuple[str, ...] | None:
     """What each `*` of a pattern stands for in a path that it matches, as a whole or by its last parts."""
     inner = expression(pattern)
-    found = re.fullmatch(inner, path) or re.fullmatch(rf"(?:.*\.)?{inner}", path)
-    return found and found.groups()
+    match = re.fullmatch(inner, path) or re.fullmatch(rf"(?:.*\.)?{inner}", path)
+    return match and match.groups()
 
 
 def _partner(path: str, follower: str, leader: str, candidates: Sequence[str]) -> str:
@@ -68,9 +68,9 @@ def _partner(path: str, follower: str, leader: str, candidates: Sequence[str]) -
     if "*" in leader:
         chosen = [c for c in candidates if _wildcards(leader, c) == _wildcards(follower, path)]
     if len(chosen) != 1:
-        found = f"{len(chosen)} of them, {', '.join(chosen)}" if chosen else "none"
+        matches = f"{len(chosen)} of them, {', '.join(chosen)}" if chosen else "none"
         remedy = f"{BY_NAME['tie'][1]} The parameters that {leader!r} names are {', '.join(candidates)}."
-        _checks.refuse(f"tie[{follower!r}]", f"name one parameter that {path} takes its value from", found, remedy)
+        _checks.refuse(f"tie[{follower!r}]", f"name one parameter that {path} takes its value from", matches, remedy)
     return chosen[0]
 
 

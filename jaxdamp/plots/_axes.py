@@ -25,8 +25,8 @@ def label_axis(axes: Axes, name: Literal["x", "y"], label: str, *, turns: bool =
 
     axis = axes.xaxis if name == "x" else axes.yaxis
     wrap(axis.set_label_text(display().text(label)), axes)
-    found = re.search(r"\[([^\[\]]+)\]", label)
-    shown = display().of(found[1] if found else "", signed=turns or display().signed(label))
+    match = re.search(r"\[([^\[\]]+)\]", label)
+    shown = display().of(match[1] if match else "", signed=turns or display().signed(label))
     factor = times * shown.factor
     from jaxdamp.plots._ticks import FewTicks, LogTicksInUnit, TicksInUnit
 

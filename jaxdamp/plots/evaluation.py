@@ -104,27 +104,27 @@ def evaluation(evaluation: Evaluation, baseline: Evaluation | None = None, limit
     return figure
 
 
-def gas_and_friction(found: GasAndFriction) -> Figure:
+def gas_and_friction(forces: GasAndFriction) -> Figure:
     """Force over stroke in both directions, with the gas force between them, and both in numbers.
 
     Arguments:
-        found: of `bench.separate_gas_and_friction`.
+        forces: of `bench.separate_gas_and_friction`.
     """
-    _checks.instance("found", found, GasAndFriction, "be separated", "Take `bench.separate_gas_and_friction(run)`.")
+    _checks.instance("forces", forces, GasAndFriction, "be separated", "Take `bench.separate_gas_and_friction(run)`.")
     figure = _style.new_figure(9.0, 5.0)
     axes = figure.subplots()
-    both_directions(axes, found)
-    _style.dress(axes, _style.STROKE, _style.FORCE, f"{found.record}: {gas_and_friction_words(found)}", zero="xy")
+    both_directions(axes, forces)
+    _style.dress(axes, _style.STROKE, _style.FORCE, f"{forces.record}: {gas_and_friction_words(forces)}", zero="xy")
     return figure
 
 
-def both_directions(axes: Axes, found: GasAndFriction) -> None:
+def both_directions(axes: Axes, forces: GasAndFriction) -> None:
     """Force over stroke [mm] into rebound and into compression without the reversals, and the static force between."""
-    cut = max(len(found.stroke) // 20, 1)  # where the stroke turns, the force is on its way from one side to the other
-    stroke, gas = found.stroke[cut:-cut], found.static_force(found.stroke)[cut:-cut]
+    cut = max(len(forces.stroke) // 20, 1)  # where the stroke turns, the force is on its way from one side to the other
+    stroke, gas = forces.stroke[cut:-cut], forces.static_force(forces.stroke)[cut:-cut]
     curves = (
-        ("into rebound", found.rebound[cut:-cut], _style.REBOUND, "-", "bottom"),
-        ("into compression", found.compression[cut:-cut], _style.COMPRESSION, "-", "top"),
+        ("into rebound", forces.rebound[cut:-cut], _style.REBOUND, "-", "bottom"),
+        ("into compression", forces.compression[cut:-cut], _style.COMPRESSION, "-", "top"),
         ("static", gas, _style.BLACK, ":", "bottom"),
     )
     for label, force, colour, dash, side in curves:
@@ -135,11 +135,11 @@ def both_directions(axes: Axes, found: GasAndFriction) -> None:
     axes.margins(y=0.15)
 
 
-def gas_and_friction_words(found: GasAndFriction, between: str = ", ") -> str:
+def gas_and_friction_words(forces: GasAndFriction, between: str = ", ") -> str:
     """Static force at mid-stroke in the sign that is shown, its rate and the friction, with their uncertainties."""
-    values = {m.quantity: m for m in found.measurements}
+    values = {m.quantity: m for m in forces.measurements}
     gas, friction = (_with_uncertainty(values[name]) for name in ("gas force", "friction"))
-    return f"Static {gas}, {_style.quantity(found.gas_rate, 'N/m')}{between}friction {friction}"
+    return f"Static {gas}, {_style.quantity(forces.gas_rate, 'N/m')}{between}friction {friction}"
 
 
 def _with_uncertainty(measurement: Measurement) -> str:

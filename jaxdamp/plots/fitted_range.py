@@ -34,9 +34,9 @@ def settled(
     axes: Axes, law: AbstractDamper, velocities: Points, name: str, *, extra: float = 0.0, **style: object
 ) -> tuple[list, list[str]]:
     """Settled and extra force [N] of a law over velocity: handles as of `curve`, and a remark where it has a gap."""
-    found = quasi_static(law, velocities)
-    handles = curve(axes, law, velocities, np.asarray(found.force) + extra, **style)
-    return handles, [f"{name}: {found.note}"] if found.note else []
+    held = quasi_static(law, velocities)
+    handles = curve(axes, law, velocities, np.asarray(held.force) + extra, **style)
+    return handles, [f"{name}: {held.note}"] if held.note else []
 
 
 def shade(axes: Axes, laws: Iterable[AbstractDamper], velocities: Points, label: str = LABEL) -> list:

@@ -122,12 +122,12 @@ def third_octaves(
 
     Each side is a label, a look and a spectrum (frequencies, densities).
     """
-    found = [np.stack([np.asarray(a) for a in metrics.third_octave_rms(*each, weighting)]) for *_, each in sides]
-    known = np.all([np.isfinite(rms) for _, rms in found], axis=0)
-    largest = np.max([np.where(known, rms, 0.0) for _, rms in found], axis=0)
+    octaves = [np.stack([np.asarray(a) for a in metrics.third_octave_rms(*each, weighting)]) for *_, each in sides]
+    known = np.all([np.isfinite(rms) for _, rms in octaves], axis=0)
+    largest = np.max([np.where(known, rms, 0.0) for _, rms in octaves], axis=0)
     drawn = np.flatnonzero(known & (largest > _FELT * largest.max()))
     bands = slice(drawn[0], drawn[-1] + 1) if drawn.size else slice(None)
-    for number, ((label, style, _), (centre, rms)) in enumerate(zip(sides, found, strict=True)):
+    for number, ((label, style, _), (centre, rms)) in enumerate(zip(sides, octaves, strict=True)):
         ends = np.append(centre[bands] * 10.0**-0.05, centre[bands][-1:] * 10.0**0.05)
         look = {name: value for name, value in style.items() if name != "color"} | {"edgecolor": style["color"]}
         filled = number == len(sides) - 1

@@ -13,24 +13,24 @@ _SHADES = {"error": _style.BAD, "warning": _style.COLOURS[1], "note": _style.COL
 _FEWEST = 3  # columns, of which a narrower picture would have too wide ones
 
 
-def preflight(found: Preflight) -> Figure:
+def preflight(result: Preflight) -> Figure:
     """A row for each record with findings, a column for each kind of them, the worst first, coloured by severity.
 
     A cell has the size of the finding; of several of a kind the largest, and their number in brackets.
 
     Arguments:
-        found: of `bench.preflight`.
+        result: of `bench.preflight`.
     """
     from matplotlib.patches import Patch, Rectangle
 
-    _checks.instance("found", found, Preflight, "be a preflight", "Take what `bench.preflight(runs)` gives.")
-    worst_first = sorted(found.findings, key=lambda finding: list(_SHADES).index(finding.severity))
+    _checks.instance("result", result, Preflight, "be a preflight", "Take what `bench.preflight(runs)` gives.")
+    worst_first = sorted(result.findings, key=lambda finding: list(_SHADES).index(finding.severity))
     names = list(dict.fromkeys(finding.name for finding in worst_first))
-    records = [name for name in found.records if any(name in finding.records for finding in found.findings)]
+    records = [name for name in result.records if any(name in finding.records for finding in result.findings)]
     figure = _style.new_figure(4.5 + 1.0 * max(len(names), 2), 2.0 + 0.34 * len(records))
     axes = figure.subplots()
     cells: dict[tuple[int, int], list[Finding]] = {}
-    for finding in found.findings:
+    for finding in result.findings:
         for record in finding.records:
             cells.setdefault((names.index(finding.name), records.index(record)), []).append(finding)
     for (x, y), findings in cells.items():
@@ -49,10 +49,10 @@ def preflight(found: Preflight) -> Figure:
     axes.grid(True, which="minor", color="0.9", linewidth=0.8)
     axes.tick_params(which="both", length=0)
     axes.spines[:].set_visible(False)
-    clean = len(found.records) - len(records)
-    _style.note_below(figure, [f"{clean} of {len(found.records)} records without findings."] * bool(clean))
-    figure.suptitle(_style.said(found.summary), wrap=True)
-    seen = [(word, colour) for word, colour in _SHADES.items() if any(f.severity == word for f in found.findings)]
+    clean = len(result.records) - len(records)
+    _style.note_below(figure, [f"{clean} of {len(result.records)} records without findings."] * bool(clean))
+    figure.suptitle(_style.said(result.summary), wrap=True)
+    seen = [(word, colour) for word, colour in _SHADES.items() if any(f.severity == word for f in result.findings)]
     if seen:
         _style.legend_beside(figure, [Patch(color=colour, alpha=0.35, label=word) for word, colour in seen])
     else:

@@ -201,8 +201,8 @@ def _forces_in_words(evaluation: Evaluation, setting: str, velocity: float) -> s
     static = 0.0 if separated is None else separated.gas_force
     forces = {}
     for side in ("rebound", "compression"):
-        found = evaluation.get(f"{side} force", setting=setting, velocity=velocity)
-        shown = dataclasses.replace(found, value=sign * (found.value - static)).cell
+        measured = evaluation.get(f"{side} force", setting=setting, velocity=velocity)
+        shown = dataclasses.replace(measured, value=sign * (measured.value - static)).cell
         forces |= {} if shown is None else {side: shown}
     words = " and ".join(f"{Column('').text(force)} N in {side}" for side, force in forces.items())
     if len(forces) == 2 and float(forces["compression"]):

@@ -240,5 +240,5 @@ def _forces(
         return jax.vmap(law.force)(x, v, states), jax.lax.stop_gradient(shot)
 
     rows = jnp.broadcast_to(frequency, amplitude.shape).ravel(), amplitude.ravel()
-    found = jax.vmap(steady)(*rows)
-    return jax.tree.map(lambda values: values.reshape(*amplitude.shape, *values.shape[1:]), found)
+    forces = jax.vmap(steady)(*rows)
+    return jax.tree.map(lambda values: values.reshape(*amplitude.shape, *values.shape[1:]), forces)

@@ -269,8 +269,8 @@ def check_demands(
         number = int(np.argmax(bad[first]))
         damper, policy = system.layout.ports[control.ports[number]], control.commanded_by[number]
         remedy = "Look for a division by zero, or a root or power of a negative number, among its signals and states."
-        found = f"{demands[first, number]} N for {damper} at the sample before {time[first]:g} s"
-        _checks.refuse(f"policy ({policy})", "demand finite forces", found, remedy)
+        demand = f"{demands[first, number]} N for {damper} at the sample before {time[first]:g} s"
+        _checks.refuse(f"policy ({policy})", "demand finite forces", demand, remedy)
 
 
 SANE = 1e6  # m, m/s

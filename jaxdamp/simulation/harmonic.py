@@ -248,5 +248,5 @@ def _swept(
     excitation = Excitation(vehicle.system(), one, one, delays, samples, substeps)
     rows = amplitude.reshape(-1, frequency.size)
     cycles, shots = jax.vmap(lambda row: sweep(excitation, frequency, row))(rows)
-    found = cycles, shots.change, shots.monodromy
-    return jax.tree.map(lambda values: values.reshape(*amplitude.shape, *values.shape[2:]), found)
+    result = cycles, shots.change, shots.monodromy
+    return jax.tree.map(lambda values: values.reshape(*amplitude.shape, *values.shape[2:]), result)

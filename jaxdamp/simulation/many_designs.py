@@ -58,24 +58,24 @@ class Designs(Generic[K]):
 
     def each(self, columns: Mapping[K, np.ndarray]) -> np.ndarray:
         """The substeps that each of many designs needs, however many, each of which a vehicle can be."""
-        count, found = len(next(iter(columns.values()))), list[int]()
+        count, indices = len(next(iter(columns.values()))), list[int]()
         for first in range(0, count, PIECE):
             piece = {name: jnp.asarray(column[first : first + PIECE]) for name, column in columns.items()}
-            found += self._counts(eqx.filter_vmap(self.build)(piece), 1 + self.several)
-        return np.array(found).reshape(count, -1).max(axis=1)
+            indices += self._counts(eqx.filter_vmap(self.build)(piece), 1 + self.several)
+        return np.array(indices).reshape(count, -1).max(axis=1)
 
     def _counts(self, vehicles: AbstractVehicle, axes: int) -> list[int]:
         """The substeps of each of several vehicles with so many axes in front of their numbers."""
-        found = list[int]()
+        counts = list[int]()
 
         def look(vehicle: AbstractVehicle) -> float:
-            found.extend(each_needs(vehicle, self.dt, np.inf))
+            counts.extend(each_needs(vehicle, self.dt, np.inf))
             return 0.0
 
         for _ in range(axes):
             look = eqx.filter_vmap(look)
         look(vehicles)
-        return found
+        return counts
 
 
 def steepest_between(designs: Designs[str], vehicle: AbstractVehicle, columns: Mapping[str, np.ndarray]) -> int:

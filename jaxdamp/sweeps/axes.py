@@ -244,8 +244,8 @@ def grid(over: Mapping[str, object]) -> Grid:
     for name, column in columns.items():
         values, counts = np.unique(column, return_counts=True)
         if counts.max() > 1:
-            found = f"{values[counts.argmax()]:g}, {counts.max()} times"
-            _checks.refuse(f"over[{name!r}]", "have each value once", found, "Leave the others out.")
+            repeated = f"{values[counts.argmax()]:g}, {counts.max()} times"
+            _checks.refuse(f"over[{name!r}]", "have each value once", repeated, "Leave the others out.")
     return Grid(columns)
 
 

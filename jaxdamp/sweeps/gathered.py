@@ -60,13 +60,13 @@ def front(values: np.ndarray) -> np.ndarray:
         for weights in np.random.default_rng(0).random((FIRST, values.shape[1])):
             best = values[left[np.argmin(scaled[left] @ weights)]]
             left = left[~_beaten(best, values[left])]
-    left, found = left[np.lexsort(values[left].T[::-1])], []
+    left, chosen = left[np.lexsort(values[left].T[::-1])], []
     while left.size:  # the first in lexical order: whatever would beat it was before it
         best = values[left[0]]
         same = np.all(values[left] == best, axis=1)
-        found += left[same].tolist()
+        chosen += left[same].tolist()
         left = left[~same & ~_beaten(best, values[left])]
-    return np.array(sorted(found), np.int64)
+    return np.array(sorted(chosen), np.int64)
 
 
 def _beaten(best: np.ndarray, values: np.ndarray) -> np.ndarray:

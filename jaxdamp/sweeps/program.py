@@ -112,12 +112,12 @@ class Program:
         count = jax.device_put(np.array(rounds, np.int32), NamedSharding(mesh, ALL))
         return jax.block_until_ready(self.run(self.arrays, point, count))
 
-    def collect(self, found: dict[str, jax.Array], size: int) -> dict[str, np.ndarray]:
+    def collect(self, results: dict[str, jax.Array], size: int) -> dict[str, np.ndarray]:
         """The results of as many points as were given."""
         mesh, chunk, _ = self.layout
         rounds = -(-size // self.capacity(1))
         collected = {}
-        for name, values in found.items():
+        for name, values in results.items():
             by_device = np.asarray(values).reshape(mesh.size, -1, *values.shape[1:])
             collected[name] = by_device[:, : rounds * chunk].reshape(-1, *values.shape[1:])[:size]
         return collected
@@ -204,9 +204,10 @@ def _jitted(static: _Static) -> jax.stages.Wrapped:
 
         def one_chunk(i: Array, results: dict[str, Array]) -> dict[str, Array]:
             lanes = {name: jax.lax.dynamic_index_in_dim(row, i, keepdims=False) for name, row in rows.items()}
-            found = evaluate(traced, arrays, lanes)
+            computed = evaluate(traced, arrays, lanes)
             return {
-                name: jax.lax.dynamic_update_index_in_dim(results[name], found[name], i, 0) for name in traced.results
+                name: jax.lax.dynamic_update_index_in_dim(results[name], computed[name], i, 0)
+                for name in traced.results
             }
 
         empty = {name: jnp.zeros((rounds, chunk, *r.shape), r.dtype) for name, r in traced.results.items()}

@@ -40,8 +40,8 @@ def check_finite(law: AbstractDamper) -> None:
 def check_rest(law: AbstractDamper) -> None:
     """No force at rest, and the law stays at rest."""
     free = free_parameters(law)
-    found = points(free, 0.0, 0.0)[0]
-    require(np.all(np.abs(found) <= 1e-9), f"Forces and rates at rest must be zero, but are {found}.")
+    at_rest = points(free, 0.0, 0.0)[0]
+    require(np.all(np.abs(at_rest) <= 1e-9), f"Forces and rates at rest must be zero, but are {at_rest}.")
     force, _ = responses(free, free.values, 1e-3, np.zeros(SAMPLES), np.zeros(SAMPLES))
     require(np.all(np.abs(force) <= 1e-9), f"The law must stay at rest, but the force becomes {force[0, -1]} N.")
 
@@ -112,11 +112,11 @@ def check_compiled(law: AbstractDamper) -> None:
     weights = np.cos(np.arange(size.size) + 0.5)
     _, forward = jax.jvp(plain, (free.values,), (jnp.asarray(along),))
     _, pull = jax.vjp(plain, free.values)
-    found = {
+    traced = {
         "forward": (forward / size, relative @ along),
         "reverse": (pull(jnp.asarray(weights / size))[0] * own, weights @ relative * own),
     }
-    for mode, (plainly, compiled) in found.items():
+    for mode, (plainly, compiled) in traced.items():
         message = f"Plain derivatives in {mode} mode must be those of a compiled batch."
         require_equal(plainly, compiled, message, rtol=1e-9, atol=1e-9)
 

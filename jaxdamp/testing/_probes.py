@@ -22,14 +22,14 @@ def require(condition: object, message: str) -> None:
         raise AssertionError(message)
 
 
-def require_equal(found: object, expected: object, message: str, *, rtol: float = 0.0, atol: float = 0.0) -> None:
+def require_equal(actual: object, expected: object, message: str, *, rtol: float = 0.0, atol: float = 0.0) -> None:
     """Raise an `AssertionError` with the message and the largest difference unless two arrays agree."""
-    found, expected = np.asarray(found), np.asarray(expected)
-    require(found.shape == expected.shape, f"{message} Their shapes are {found.shape} and {expected.shape}.")
-    excess = np.abs(found - expected) - rtol * np.abs(expected)
-    if found.size and not np.all(excess <= atol):
-        worst = np.unravel_index(int(np.argmax(np.nan_to_num(excess, nan=np.inf))), found.shape)
-        raise AssertionError(f"{message} The largest difference is {found[worst]!r} against {expected[worst]!r}.")
+    actual, expected = np.asarray(actual), np.asarray(expected)
+    require(actual.shape == expected.shape, f"{message} Their shapes are {actual.shape} and {expected.shape}.")
+    excess = np.abs(actual - expected) - rtol * np.abs(expected)
+    if actual.size and not np.all(excess <= atol):
+        worst = np.unravel_index(int(np.argmax(np.nan_to_num(excess, nan=np.inf))), actual.shape)
+        raise AssertionError(f"{message} The largest difference is {actual[worst]!r} against {expected[worst]!r}.")
 
 
 def require_refusal(
@@ -63,12 +63,12 @@ def _probe(free: FreeParameters, x: Array, v: Array) -> tuple[Array, ...]:
     """The outputs at many (x, v), with their derivatives in the parameters, x and v."""
 
     def both(values: Array, x: Array, v: Array) -> tuple[Array, Array]:
-        found = outputs(free.build(values), x, v)
-        return found, found
+        results = outputs(free.build(values), x, v)
+        return results, results
 
     def one(x: Array, v: Array) -> tuple[Array, ...]:
-        slopes, found = jax.jacfwd(both, argnums=(0, 1, 2), has_aux=True)(free.values, x, v)
-        return found, *slopes
+        slopes, results = jax.jacfwd(both, argnums=(0, 1, 2), has_aux=True)(free.values, x, v)
+        return results, *slopes
 
     return jax.vmap(one)(x, v)
 
@@ -169,7 +169,7 @@ def random_motions() -> tuple[float, np.ndarray, np.ndarray]:
 
 def knees(law: AbstractDamper) -> np.ndarray:
     """Zero and all velocities [m/s] among the numbers of a law and of the laws inside, and divided by motion ratios."""
-    found, modules = [0.0], [law]
+    knees, modules = [0.0], [law]
     ratios = [float(r) for p in parameters(law) if p.path.endswith("ratio") for r in np.ravel(p.value)]
     while modules:
         module = modules.pop()
@@ -180,7 +180,7 @@ def knees(law: AbstractDamper) -> np.ndarray:
                 declared = field.metadata.get("parameter") or field.metadata.get("setting") or {}
                 value = getattr(module, name)
                 if declared.get("unit") == "m/s":
-                    found += np.ravel(value).tolist()
+                    knees += np.ravel(value).tolist()
                 modules.append(value)
-    both = np.array([*found, *(-a for a in found)])
+    both = np.array([*knees, *(-a for a in knees)])
     return np.unique(np.concatenate([both, *(both / r for r in ratios)]))

@@ -110,8 +110,8 @@ def check_declared(policy: Policy) -> None:
 def check_finite(policy: Policy) -> None:
     """Demands and derivatives are finite at rest, for tiny signals and for large ones."""
     for size in (0.0, 1e-12, 1.0, 1e3):
-        found = _answers(policy, Signals(*(size * y for y in _signals())))
-        for name, part in zip(("Demands", "Derivatives in numbers", "Derivatives in signals"), found, strict=True):
+        answers = _answers(policy, Signals(*(size * y for y in _signals())))
+        for name, part in zip(("Demands", "Derivatives in numbers", "Derivatives in signals"), answers, strict=True):
             good = all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves(part))
             remedy = "Look for a division, a root or a power at zero, or a `where` around an infinite slope."
             require(good, f"{name} are not finite for signals of {size:g} times their usual size. {remedy}")
@@ -152,9 +152,9 @@ def check_derivatives(policy: Policy) -> None:
     at = (flat.numbers, signals)
     along, back = derived(at)[1:]
     along = np.asarray(along)
-    found = sum(float(jnp.vdot(a, b)) for a, b in zip(jax.tree.leaves(back), jax.tree.leaves(way), strict=True))
+    backward = sum(float(jnp.vdot(a, b)) for a, b in zip(jax.tree.leaves(back), jax.tree.leaves(way), strict=True))
     message = "Forward and reverse derivatives must agree."
-    require_equal(found, along @ np.asarray(weights), message, rtol=1e-8, atol=1e-9 * size)
+    require_equal(backward, along @ np.asarray(weights), message, rtol=1e-8, atol=1e-9 * size)
     ends = (derived(jax.tree.map(lambda a, b, s=sign: a + s * 1e-5 * b, at, way))[0] for sign in (1.0, -1.0))
     up, down = map(np.asarray, ends)
     message = "Derivatives and differences must agree, sample by sample: demands must be smooth."
@@ -176,10 +176,10 @@ def check_single_precision(policy: Policy) -> None:
     expected = np.asarray(_answers(policy, _signals())[0])
     with jax.enable_x64(False):
         single = jax.tree.map(lambda y: jnp.asarray(np.asarray(y)) if eqx.is_array(y) else y, policy)
-        found = eqx.filter_jit(_demands)(single, _signals())
-        require(found.dtype == jnp.float32, f"Demands are {found.dtype} where all numbers are of single precision.")
+        demands = eqx.filter_jit(_demands)(single, _signals())
+        require(demands.dtype == jnp.float32, f"Demands are {demands.dtype} where all numbers are of single precision.")
     message = "In single precision demands must be the same."
-    require_equal(found, expected, message, atol=1e-4 * _largest(expected))
+    require_equal(demands, expected, message, atol=1e-4 * _largest(expected))
 
 
 def check_driven(policy: Policy) -> None:
@@ -195,8 +195,8 @@ def check_driven(policy: Policy) -> None:
         other = eqx.tree_at(lambda ride: ride.vehicle.policy, ride, flat.build(numbers))
         return other()["rms_sprung_acceleration"]
 
-    found = np.asarray(jax.jit(lambda at: jax.jvp(value, (at,), (at,)))(flat.numbers))
-    require(np.all(np.isfinite(found)) and found[0] > 0.0, f"In a car RMS acceleration and derivative are {found}.")
+    slope = np.asarray(jax.jit(lambda at: jax.jvp(value, (at,), (at,)))(flat.numbers))
+    require(np.all(np.isfinite(slope)) and slope[0] > 0.0, f"In a car RMS acceleration and derivative are {slope}.")
 
 
 def _largest(demands: np.ndarray) -> float:

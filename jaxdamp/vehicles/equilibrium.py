@@ -47,10 +47,10 @@ def rest_position(system: System, road: Float[Array, " wheels"]) -> Float[Array,
     solver = _SharedNewton(atol=1e-8 if scale.dtype == jnp.float32 else 1e-14)
     setting = form, ports, road, jax.lax.stop_gradient(scale)
     start = varying_as(jnp.zeros_like(form.mass[0]), *eqx.filter(setting, eqx.is_array))
-    found = optx.root_find(
+    solution = optx.root_find(
         _unbalanced, solver, start, setting, max_steps=STEPS, adjoint=ImplicitDerivatives(), throw=False
     )
-    return jnp.where(found.state < 1e3 * solver.atol, found.value, jnp.nan)
+    return jnp.where(solution.state < 1e3 * solver.atol, solution.value, jnp.nan)
 
 
 def _residual_force(form: PortForm, ports: Ports, road: Array, q: Float[Array, " q"]) -> tuple[Array, Array]:

@@ -189,7 +189,7 @@ def _on_random_road(
     behind = jnp.stack([wheel.behind for wheel in vehicle.frame().wheels])
     delays = delays_of(behind, max(vehicle.layout.axles) + 1, speed, in_phase)
     try:
-        linear, found = _linearise_statistically(vehicle, jnp.asarray(velocity_psd, dtype=float), delays)
+        linear, converged = _linearise_statistically(vehicle, jnp.asarray(velocity_psd, dtype=float), delays)
     except NoiseAtLaw as noise:
         name = vehicle.layout.ports[noise.port]
         law = type(vehicle.frame().element(name).law).__name__
@@ -197,7 +197,7 @@ def _on_random_road(
             f"have linear laws between wheel and road on a white road: the velocity of {name} has no finite RMS there"
         )
         _checks.refuse("vehicle", must, f"one with a {law}", INSTEAD)
-    success = _checks.concrete(found)
+    success = _checks.concrete(converged)
     if success is not None and not success:
         names = vehicle.layout.ports[: len(vehicle.layout.ports) - sum(vehicle.layout.lifts)]
         laws = ", ".join(f"{name} ({type(vehicle.frame().element(name).law).__name__})" for name in names)
@@ -217,10 +217,10 @@ def _linearise_statistically(
     on_road = [name in at_road for name in system.layout.ports]
     lifting = sum(system.layout.lifts)
     lifts = [number >= len(on_road) - lifting for number in range(len(on_road))]
-    laws, found = statistical_laws(system, velocity_psd, delays, on_road, lifts)
+    laws, converged = statistical_laws(system, velocity_psd, delays, on_road, lifts)
     linear = _assembled(vehicle, laws)
-    lost = jnp.where(found > 0, linear.feed_through, jnp.inf)
-    return eqx.tree_at(lambda linear: linear.feed_through, linear, lost), found
+    lost = jnp.where(converged > 0, linear.feed_through, jnp.inf)
+    return eqx.tree_at(lambda linear: linear.feed_through, linear, lost), converged
 
 
 @compiled_quickly

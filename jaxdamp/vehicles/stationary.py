@@ -132,13 +132,13 @@ def equivalent_dampers(
     if not chosen:
         return {}
     covariance = velocity_psd * _covariance(linear, linear.delays(speed, in_phase), chosen)
-    found = {}
+    dampers = {}
     for i, (name, (_, rate)) in enumerate(pairs.items()):
         power, square = covariance[2 * i, 2 * i + 1], at_least(covariance[2 * i + 1, 2 * i + 1], 1e-30)
         noisy = jnp.any(linear.feed_through[rate] != 0)
         velocity = jnp.where(noisy, jnp.inf, root(square))
-        found[name] = EquivalentDamper(power / square, velocity, not nonlinear_variables(laws[name]))
-    return found
+        dampers[name] = EquivalentDamper(power / square, velocity, not nonlinear_variables(laws[name]))
+    return dampers
 
 
 def _in_motion(

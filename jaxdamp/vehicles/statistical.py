@@ -103,8 +103,8 @@ def statistical_laws(
         spreads = _distributions(system, kinds, _nearest(kinds, unravel(y), owners), psd, delays)
         return jax.flatten_util.ravel_pytree(spreads)[0]
 
-    solution, found = _fixed_point(again, jax.lax.stop_gradient(start), arrays)
-    return _nearest(kinds, unravel(solution), owners), found
+    solution, converged = _fixed_point(again, jax.lax.stop_gradient(start), arrays)
+    return _nearest(kinds, unravel(solution), owners), converged
 
 
 def _curved(law: AbstractDamper, port: int, on_road: bool, lifts: bool) -> tuple[int, ...]:
@@ -331,16 +331,16 @@ def _fixed_point(function: Callable[[Array, PyTree], Array], start: Array, argum
     def solution(start: Array, differentiable: object) -> tuple[Array, Scalar]:
         accuracy = 1e-4 if start.dtype == jnp.float32 else 1e-9
         solver = optx.FixedPointIteration(rtol=accuracy, atol=accuracy)
-        found = optx.fixed_point(step, solver, start, differentiable, max_steps=MOST_STEPS, throw=False)
-        return found.value, jnp.where(found.result == optx.RESULTS.successful, 1.0, 0.0).astype(start.dtype)
+        result = optx.fixed_point(step, solver, start, differentiable, max_steps=MOST_STEPS, throw=False)
+        return result.value, jnp.where(result.result == optx.RESULTS.successful, 1.0, 0.0).astype(start.dtype)
 
     def rule(
         primals: tuple[object, ...], tangents: tuple[object, ...]
     ) -> tuple[tuple[Array, Scalar], tuple[Array, Scalar]]:
-        y, found = solution(*primals)
+        y, converged = solution(*primals)
         (_, now), (_, moved) = primals, tangents
         _, change = jax.jvp(lambda d: function(y, eqx.combine(d, rest)), (now,), (moved,))
-        return (y, found), (solve(slope(y, now)[0], change), jnp.zeros_like(found))
+        return (y, converged), (solve(slope(y, now)[0], change), jnp.zeros_like(converged))
 
     solution.defjvp(rule)
     return solution(start, differentiable)

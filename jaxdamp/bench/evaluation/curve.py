@@ -299,8 +299,10 @@ class Forces(NamedTuple):
         """Forces at the peak velocities of each direction, one for each motion: repeated records are averaged."""
         by = {(m.record, m.quantity): m for m in measurements if m.record and m.setting == setting}
         groups = repeats(self.settings[setting])
-        found = {name: [_peak_force([run.name for run in group], by, name) for group in groups] for name in DIRECTIONS}
-        return {name: [peak for peak in peaks if peak is not None] for name, peaks in found.items()}
+        by_direction = {
+            name: [_peak_force([run.name for run in group], by, name) for group in groups] for name in DIRECTIONS
+        }
+        return {name: [peak for peak in peaks if peak is not None] for name, peaks in by_direction.items()}
 
     def span(self, measurements: Sequence[Measurement]) -> tuple[float, float, str]:
         """The lowest and highest velocity at which all settings give a force, equal if at none; in words."""

@@ -78,8 +78,8 @@ def evaluate(
         else:
             measurements += [replace(m, setting=name) for m in gas[name].measurements if np.isfinite(m.value)]
             notes += [f"{slowest.name}: {gas[name].note}"] if gas[name].note else []
-    missed, found = _not_reached(velocities, forces, measurements)
-    measurements, notes = measurements + found, missed + notes
+    missed, added = _not_reached(velocities, forces, measurements)
+    measurements, notes = measurements + added, missed + notes
     stated = tuple(sorted({m.velocity for m in measurements if m.velocity is not None}))
     return Evaluation(tuple(measurements), settings, cycles, gas, stated, forces.method, tuple(notes), window)
 
@@ -165,12 +165,12 @@ def _not_reached(
     low, high, where = forces.span(measurements)
     if velocities is not None:
         return [f"No force at {v:.4g} m/s: {where}." for v in missed], []
-    found, instead = list[Measurement](), "Add records of other velocities."
+    measured, instead = list[Measurement](), "Add records of other velocities."
     if low < high or forces.method == "loop":
         digits = 1 - int(np.floor(np.log10(high)))
         velocity = max(float(np.floor(high * 10.0**digits) / 10.0**digits), low)
         instead = f"Forces are stated at {velocity:.4g} m/s."
         for name in forces.settings:
-            found += forces.at([velocity], name, measurements)
+            measured += forces.at([velocity], name, measurements)
     usual = f"None of the usual velocities, from {curve.OEM_VELOCITIES[0]:g} m/s on, is reached"
-    return [f"{usual}: {where}. {instead}"], found
+    return [f"{usual}: {where}. {instead}"], measured

@@ -169,14 +169,14 @@ class Evaluation(AbstractResult):
 
         Forces are evaluated at the velocities of the limits too, as at those given to `bench.evaluate`.
         """
-        limits, found = tuple(limits), [*self.measurements]
+        limits, measurements = tuple(limits), [*self.measurements]
         forces = Forces(self.settings, self.cycles, self.method, self.window)
         wanted = dict.fromkeys(limit.velocity for limit in limits if limit.velocity is not None)
         for name in self.settings:
             own = [m for m in self.measurements if m.setting == name]
             missing = [velocity for velocity in wanted if not any(at_velocity(m, velocity) for m in own)]
-            found += forces.at(missing, name, self.measurements)
-        return LimitCheck.of(found, limits, forces.span(self.measurements)[2])
+            measurements += forces.at(missing, name, self.measurements)
+        return LimitCheck.of(measurements, limits, forces.span(self.measurements)[2])
 
     def content(self) -> Contents:
         """All measurements as plain data."""

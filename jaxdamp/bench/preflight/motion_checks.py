@@ -119,8 +119,8 @@ def magnitudes(e: Examined) -> list[Finding]:
     beyond = _times_beyond(values)
     if np.all(beyond == 1.0):
         return []
-    if np.prod(beyond) >= _CLEARLY and not exchanged(e) and (found := _mistaken_unit(e, values, beyond)):
-        return found
+    if np.prod(beyond) >= _CLEARLY and not exchanged(e) and (mistake := _mistaken_unit(e, values, beyond)):
+        return mistake
     findings = []
     for value, (what, unit, low, high, question) in zip(values, _USUAL, strict=True):
         if not low <= value <= high:
