@@ -122,8 +122,8 @@ class Display:
         parts += ["compression positive"] * (self.sign == COMPRESSION)
         if self.plain:
             return ""
-        kept = "; sentences, JSON files and parameters of formulas count rebound positive"
-        return f"Shown in {', '.join(parts)}{kept * (self.sign == COMPRESSION)}."
+        exceptions = "; sentences, JSON files and parameters of formulas count rebound positive"
+        return f"Shown in {', '.join(parts)}{exceptions * (self.sign == COMPRESSION)}."
 
     @property
     def _system(self) -> dict[str, str]:

@@ -31,12 +31,12 @@ def outside_domains(tree: PyTree, columns: Columns) -> np.ndarray:
     rate must be positive [N s/m];
     """
     every = named_parameters(tree, columns)
-    known = {p.path: p for p in every}
+    of_path = {p.path: p for p in every}
     named = {path: np.asarray(column) for name, column in columns.items() for path in match_parameters(every, [name])}
-    by_path = {path: column for path, column in named.items() if known[path].value.ndim == 0}
+    by_path = {path: column for path, column in named.items() if of_path[path].value.ndim == 0}
     reasons = np.full(len(next(iter(named.values()))), "", dtype=object)
     for path, column in by_path.items():
-        p, (owner, _, name) = known[path], path.rpartition(".")
+        p, (owner, _, name) = of_path[path], path.rpartition(".")
         if name not in _domains_by_value(get(tree, owner)):  # which follows from the other values of its module
             unit = f" [{p.unit}]" if p.unit else ""
             reasons[(reasons == "") & ~_inside(p.domain, column)] = f"{path} must be {p.domain.name}{unit}"

@@ -52,9 +52,9 @@ def piece(inputs: tuple[object, ...], compute: Callable[[], T]) -> T:
     except UNPICKLED as error:
         _not_kept(error)
         return compute()
-    kept = _read(file)
-    if kept is not None:
-        return pickle.loads(kept)
+    stored = _read(file)
+    if stored is not None:
+        return pickle.loads(stored)
     result = compute()
     try:
         content = pickle.dumps(result)

@@ -122,12 +122,12 @@ def _words(seed: int | Array) -> UInt32[Array, "2"]:
             return words if words.shape == (2,) else jax.random.bits(seed, (2,), "uint32")
         if seed.shape == (2,):
             return seed.astype(jnp.uint32)
-    known = _checks.concrete(seed)
-    kind = seed.dtype if known is None and isinstance(seed, jax.Array) else np.asarray(known).dtype
+    concrete = _checks.concrete(seed)
+    kind = seed.dtype if concrete is None and isinstance(seed, jax.Array) else np.asarray(concrete).dtype
     if np.ndim(seed) or not jnp.issubdtype(kind, jnp.integer):
         _checks.refuse("seed", "be a whole number or a JAX random key", repr(seed), "Pass `seed=1`.")
-    if known is not None:
-        number = int(known)
+    if concrete is not None:
+        number = int(concrete)
         # with its type named, JAX takes an array over as it is, without a program
         return jnp.asarray(np.array([number >> 32 & _MASK, number & _MASK], dtype=np.uint32), np.uint32)
     traced = jnp.asarray(seed)

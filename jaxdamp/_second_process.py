@@ -47,7 +47,7 @@ class Process:
 
     def __init__(self, pid: int, ends: socket.socket) -> None:
         self.pid, self._ends, self._stream = pid, ends, ends.makefile("rwb")
-        self._known: list[object] = []
+        self._sent: list[object] = []
 
     def begin(self, function: Callable[..., object], arguments: Sequence[object], shared: Sequence[object]) -> None:
         """Tell it to compute.
@@ -60,12 +60,12 @@ class Process:
         Raises:
             Unsent: the function or its arguments cannot be pickled.
         """
-        new = [thing for thing in shared if not any(thing is known for known in self._known)]
+        new = [thing for thing in shared if not any(thing is sent for sent in self._sent)]
         try:
-            content = _pickled(new, ()), _pickled((function, tuple(arguments)), [*self._known, *new])
+            content = _pickled(new, ()), _pickled((function, tuple(arguments)), [*self._sent, *new])
         except UNPICKLED as error:
             raise Unsent(str(error)) from error
-        self._known += new
+        self._sent += new
         try:
             for part in content:
                 _send(self._stream, part)
@@ -79,7 +79,7 @@ class Process:
             Lost: the process has ended.
         """
         try:
-            return cast(tuple[bool, object], _read(self._stream, self._known))
+            return cast(tuple[bool, object], _read(self._stream, self._sent))
         except (EOFError, OSError) as error:
             raise Lost(str(error)) from error
 
@@ -108,9 +108,9 @@ class Process:
 class _Shared(pickle.Pickler):
     """Objects that both sides have are written as their numbers."""
 
-    def __init__(self, stream: IO[bytes], known: Sequence[object]) -> None:
+    def __init__(self, stream: IO[bytes], shared: Sequence[object]) -> None:
         super().__init__(stream, protocol=pickle.HIGHEST_PROTOCOL)
-        self._numbers = {id(thing): number for number, thing in enumerate(known)}
+        self._numbers = {id(thing): number for number, thing in enumerate(shared)}
 
     def persistent_id(self, obj: object) -> int | None:
         """The number of an object that both sides have."""
@@ -118,18 +118,18 @@ class _Shared(pickle.Pickler):
 
 
 class _Known(pickle.Unpickler):
-    def __init__(self, stream: IO[bytes], known: Sequence[object]) -> None:
+    def __init__(self, stream: IO[bytes], shared: Sequence[object]) -> None:
         super().__init__(stream)
-        self._things = known
+        self._things = shared
 
     def persistent_load(self, pid: int) -> object:
         """The object of that number."""
         return self._things[pid]
 
 
-def _pickled(thing: object, known: Sequence[object]) -> bytes:
+def _pickled(thing: object, shared: Sequence[object]) -> bytes:
     stream = io.BytesIO()
-    _Shared(stream, known).dump(thing)
+    _Shared(stream, shared).dump(thing)
     return stream.getvalue()
 
 
@@ -138,12 +138,12 @@ def _send(stream: io.BufferedRWPair, content: bytes) -> None:
     stream.flush()
 
 
-def _read(stream: io.BufferedRWPair, known: Sequence[object]) -> object:
+def _read(stream: io.BufferedRWPair, shared: Sequence[object]) -> object:
     length = stream.read(8)
     content = stream.read(int.from_bytes(length, "little"))
     if len(length) < 8:
         raise EOFError("the other process has ended")
-    return _Known(io.BytesIO(content), known).load()
+    return _Known(io.BytesIO(content), shared).load()
 
 
 _lock = threading.Lock()
@@ -323,15 +323,15 @@ def _serve(stream: io.BufferedRWPair, prepare: Callable[[], object]) -> None:
     ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL)
     jax.config.update("jax_platforms", "cpu")  # a GPU is the other side's
     prepare()
-    known: list[object] = []
+    shared: list[object] = []
     while True:
         try:
-            known += cast(list[object], _read(stream, ()))
-            function, arguments = cast(_Call, _read(stream, known))
+            shared += cast(list[object], _read(stream, ()))
+            function, arguments = cast(_Call, _read(stream, shared))
         except (EOFError, OSError):
             return
         try:
-            answer = _pickled((True, function(*arguments)), known)
+            answer = _pickled((True, function(*arguments)), shared)
         except Exception as error:
             answer = _raised(error)
         try:

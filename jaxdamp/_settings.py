@@ -26,7 +26,7 @@ def with_defaults(
     Raises:
         TypeError: by the function, for a keyword that there is not, with the nearest one.
     """
-    known = {**defaults, **others}
+    filled = {**defaults, **others}
 
     def decorated(function: Function) -> Function:
         signature = inspect.signature(function)
@@ -35,7 +35,7 @@ def with_defaults(
             n: getattr(k, "__forward_arg__", k) for n, k in get_args(settings.annotation)[0].__annotations__.items()
         }
         keyword = functools.partial(inspect.Parameter, kind=inspect.Parameter.KEYWORD_ONLY)
-        described = [keyword(name, default=value, annotation=kinds[name]) for name, value in known.items()]
+        described = [keyword(name, default=value, annotation=kinds[name]) for name, value in filled.items()]
         names = {p.name: p for p in (*own, *described)}
 
         @functools.wraps(function)
@@ -46,7 +46,7 @@ def with_defaults(
                     listed = ", ".join(n for n, p in names.items() if p.kind is p.KEYWORD_ONLY)
                     hint = f"did you mean {near[0]!r}?" if near else f"it has {listed}."
                     raise TypeError(f"{function.__name__} has no argument {name!r}: {hint}")
-            complete = {**known, **given}
+            complete = {**filled, **given}
             if check is not None:
                 check(complete)
             return function(*args, **complete)

@@ -33,8 +33,8 @@ class Configuration(NamedTuple):
         bits = "64-bit" if self.x64 else "32-bit"
         plural = "" if self.cpu_devices == 1 else "s"
         loops = "compiled as one function" if self.fused_loops else "as JAX compiles them"
-        kept = f"kept in {self.cache}" if self.cache else "not kept"
-        return f"jaxdamp: {bits} floats, {self.cpu_devices} CPU device{plural}, loops {loops}, compiled code {kept}."
+        storage = f"kept in {self.cache}" if self.cache else "not kept"
+        return f"jaxdamp: {bits} floats, {self.cpu_devices} CPU device{plural}, loops {loops}, compiled code {storage}."
 
 
 def configure(
@@ -166,11 +166,11 @@ def _refuse_change(devices: int, fused_loops: bool) -> None:
 def _with_option(flags: str, fused_loops: bool) -> str:
     """The flags of XLA with or without the options for loops; those of others stay."""
     extra = "--xla_backend_extra_options="
-    kept = [flag for flag in flags.split() if flag != _WIDE]
-    backend = [part for flag in kept if flag.startswith(extra) for part in flag.removeprefix(extra).split(",")]
+    others = [flag for flag in flags.split() if flag != _WIDE]
+    backend = [part for flag in others if flag.startswith(extra) for part in flag.removeprefix(extra).split(",")]
     backend = [part for part in backend if part != _FUSED] + [_FUSED] * fused_loops
-    kept = [flag for flag in kept if not flag.startswith(extra)]
-    return " ".join(kept + [extra + ",".join(backend)] * bool(backend) + [_WIDE] * fused_loops)
+    others = [flag for flag in others if not flag.startswith(extra)]
+    return " ".join(others + [extra + ",".join(backend)] * bool(backend) + [_WIDE] * fused_loops)
 
 
 def _folder(cache: bool | str | Path) -> Path | None:

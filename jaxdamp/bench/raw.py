@@ -232,13 +232,13 @@ def _groups(columns: Sequence[RawColumn], clocks: Sequence[Clock | None]) -> lis
     """The channels of each number of samples and clock, with the instants of the clock."""
     lengths = [len(column.values) for column in columns]
     timed = {n for n, column in zip(lengths, columns, strict=True) if _is_time(column)}
-    known = {count: {c for n, c in zip(lengths, clocks, strict=True) if n == count and c} for count in lengths}
+    clocks_of = {count: {c for n, c in zip(lengths, clocks, strict=True) if n == count and c} for count in lengths}
     groups: dict[tuple[int, Clock | None], list[RawColumn]] = {}
     for column, count, clock in zip(columns, lengths, clocks, strict=True):
         if count in timed:
             clock = None
-        elif len(known[count]) == 1:
-            (clock,) = known[count]
+        elif len(clocks_of[count]) == 1:
+            (clock,) = clocks_of[count]
         groups.setdefault((count, clock), []).append(column)
     for (count, clock), group in groups.items():
         if clock is not None:

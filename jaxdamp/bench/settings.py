@@ -63,19 +63,19 @@ def _value(text: str) -> float | str:
     return float(text.replace(",", ".")) if _NUMBER.fullmatch(text) else text
 
 
-def refuse_misspelt(name: str, known: Iterable[str]) -> None:
+def refuse_misspelt(name: str, names: Iterable[str]) -> None:
     """Refuse a setting whose name is nearly one that has a meaning, which would state nothing.
 
     Longer names, such as "oil_temperature", and those that are near to nothing are the user's own.
 
     Arguments:
         name: of the setting.
-        known: names that have a meaning.
+        names: names that have a meaning.
 
     Raises:
         ValueError: such a name.
     """
-    others = {word.lower(): word for word in known if word != name}
+    others = {word.lower(): word for word in names if word != name}
     near = get_close_matches(name.lower(), others, 1, _NEAR)
     if near and (near[0] == name.lower() or near[0] not in name.lower()):
         remedy = f"Did you mean {others[near[0]]!r}? If not, name it otherwise: it would be taken for that."

@@ -105,8 +105,10 @@ def decide(
     work, loss = loss_fraction(time, stroke, force)
     clear = abs(loss) >= LEAST_LOSS
     done = f"work per cycle {work:+.4g} J"
-    known = f"the {done} is only {abs(loss):.1%} of that of a damper with this force and stroke"
-    doubt = known if np.isfinite(work) else "the stroke does not come back: its work may be that of a spring or of gas"
+    evidence = f"the {done} is only {abs(loss):.1%} of that of a damper with this force and stroke"
+    doubt = (
+        evidence if np.isfinite(work) else "the stroke does not come back: its work may be that of a spring or of gas"
+    )
     if sign is None and force_sign is None and not clear:
         _refuse_unclear(doubt, stated, where)
     if clear:

@@ -96,8 +96,8 @@ def _stands_out(power: Float[np.ndarray, " lines"], first: int) -> Bool[np.ndarr
     """Which lines, from the first one on, are tones: noise of any colour has lines as high beside each other."""
     fast = power[first:]
     blocks = np.pad(fast, (0, -len(fast) % _BESIDE), mode="edge").reshape(-1, _BESIDE)
-    beside = np.quantile(blocks, 0.25, axis=1) / np.log(4 / 3)  # mean of noise from its lower quartile
-    tones = np.repeat(beside, _BESIDE)[: len(fast)] * _STANDS_OUT < fast
+    noise = np.quantile(blocks, 0.25, axis=1) / np.log(4 / 3)  # mean of noise from its lower quartile
+    tones = np.repeat(noise, _BESIDE)[: len(fast)] * _STANDS_OUT < fast
     return np.concatenate([np.zeros(first, bool), tones])
 
 

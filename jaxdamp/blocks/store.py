@@ -92,7 +92,7 @@ class BlockStore(AbstractStore):
         dims: tuple[str, ...],
         variables: Mapping[str, Variable],
         coordinates: Mapping[str, tuple[str, np.ndarray, dict[str, str]]],
-        known: Mapping[str, np.ndarray] | None = None,
+        arrays: Mapping[str, np.ndarray] | None = None,
     ) -> None:
         """Make the store, whole or not at all, unless it is there; one of something else is refused.
 
@@ -100,14 +100,14 @@ class BlockStore(AbstractStore):
             dims: names of the axes of the grid.
             variables: what is stored for each point.
             coordinates: along an axis each, with attributes.
-            known: what is known of the points already, by the name of its variable.
+            arrays: what is known of the points already, by the name of its variable.
         """
         self._names = tuple(variables)
         if not self.path.exists():
             draft = Path(tempfile.mkdtemp(prefix=f".{self.path.name}.", dir=self.path.parent))
             try:
                 self._make(draft, dims, variables, coordinates)
-                _enter(draft, known or {}, 0)
+                _enter(draft, arrays or {}, 0)
                 draft.chmod(0o777 & ~_umask())
                 draft.rename(self.path)
             except OSError as error:
@@ -156,32 +156,32 @@ class BlockStore(AbstractStore):
             dimension_names=(BLOCK,),
         )
 
-    def append(self, known: Mapping[str, np.ndarray]) -> "BlockStore":
+    def append(self, arrays: Mapping[str, np.ndarray]) -> "BlockStore":
         """The store with further blocks at the end of its only axis, which are not done.
 
         Arguments:
-            known: what is known of their points, by the name of its variable; whole blocks.
+            arrays: what is known of their points, by the name of its variable; whole blocks.
         """
         (size,), (box,) = self.blocks.shape, self.blocks.box
-        longer = size + len(next(iter(known.values())))
+        longer = size + len(next(iter(arrays.values())))
         group = import_zarr().open_group(self.path, mode="r+")
         for name in self._names:
             array: zarr.Array = group[name]  # pyright: ignore[reportAssignmentType]
             array.resize((longer, *array.shape[1:]))
-        _enter(self.path, known, size)
+        _enter(self.path, arrays, size)
         marks: zarr.Array = group[DONE]  # pyright: ignore[reportAssignmentType]
         marks.resize((longer // box,))  # last: before it the further points are not there
         more = BlockStore(self.path, Blocks((longer,), (box,)), self._identity)
         more._names = self._names
         return more
 
-    def begun_again(self, number: int, known: Mapping[str, np.ndarray]) -> None:
+    def begun_again(self, number: int, arrays: Mapping[str, np.ndarray]) -> None:
         """A block along the only axis that is not done any more, with what is known of its points."""
         group, start = import_zarr().open_group(self.path, mode="r+"), number * self.blocks.box[0]
         group[DONE][number] = -1
         for name, blank in zip(FAILURES, (False, ""), strict=True):
             group[name][self.blocks.region(number)] = blank
-        _enter(self.path, known, start)
+        _enter(self.path, arrays, start)
 
     def read(self, *names: str, start: int = 0, stop: int | None = None) -> dict[str, np.ndarray]:
         """Variables of all points along the first axis, or of some."""
@@ -306,11 +306,11 @@ def note_command(path: Path, text: str) -> None:
         import_zarr().open_group(path, mode="r+").attrs[COMMAND] = text
 
 
-def _enter(path: Path, known: Mapping[str, np.ndarray], start: int) -> None:
+def _enter(path: Path, arrays: Mapping[str, np.ndarray], start: int) -> None:
     """Write what is known of points from `start` on, empty texts too: a chunk that is not there was lost."""
     with import_zarr().config.set({"array.write_empty_chunks": True}):
         group = import_zarr().open_group(path, mode="r+")
-        for name, values in known.items():
+        for name, values in arrays.items():
             group[name][start : start + len(values)] = values
 
 

@@ -47,12 +47,12 @@ class Command(TyperCommand):
         replaced = []
         for word, following in itertools.zip_longest(args, args[1:], fillvalue=""):
             option, equals, value = word.partition("=")
-            known = self.aliases.get(option, option) if option not in names else option
+            spelled = self.aliases.get(option, option) if option not in names else option
             if option == "--out" and "--file" in names:
                 ctx.fail("--out names a folder of results. This command writes one file: name it with --file.")
             if option == "--units" and "--show-units" in names and "=" not in (value or following):
-                known = "--show-units"
-            replaced.append(f"{known}{equals}{value}")
+                spelled = "--show-units"
+            replaced.append(f"{spelled}{equals}{value}")
         self._refuse_repeated(ctx, replaced)
         return super().parse_args(ctx, replaced)
 

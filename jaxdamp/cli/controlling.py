@@ -80,9 +80,9 @@ def parse_policy(word: str, car: AbstractVehicle) -> Policy:
     if word.endswith(".json"):
         kinds = (control.AbstractPolicy, control.AbstractVehiclePolicy)
         return read_module("controller", Path(word), kinds, "a policy", "`jaxdamp tune --controller` writes it.")
-    known = POLICIES | {"lqr": functools.partial(control.lqr, car)}
+    policies = POLICIES | {"lqr": functools.partial(control.lqr, car)}
     name, _, rest = word.partition(":")
-    _checks.one_of("controller", name, known)
+    _checks.one_of("controller", name, policies)
     try:
         pairs = [part.split("=") for part in rest.split(",") if part]
         numbers = {key.strip(): float(value) for key, value in pairs}
@@ -90,11 +90,11 @@ def parse_policy(word: str, car: AbstractVehicle) -> Policy:
         _checks.refuse("controller", "read like skyhook:gain=3000,lead=0.01", repr(word))
     if len(numbers) < len(pairs):
         _checks.refuse("controller", "give each number once", repr(word))
-    fields = inspect.signature(known[name]).parameters
+    fields = inspect.signature(policies[name]).parameters
     for key in numbers:
         _checks.one_of("controller", key, fields)
     missing = [key for key, field in fields.items() if field.default is field.empty and key not in numbers]
     if missing:
         remedy = f"Write {name}:{','.join(f'{key}=NUMBER' for key in missing)}."
         _checks.refuse("controller", f"have a {' and a '.join(missing)}", repr(word), remedy)
-    return known[name](**numbers)
+    return policies[name](**numbers)

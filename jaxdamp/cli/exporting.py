@@ -43,7 +43,7 @@ class OneFile:
     file: Path | None = None
     replace: bool = False
 
-    def checked(self, name: str, beside: Sequence[str] = ()) -> Path:
+    def checked(self, name: str, others: Sequence[str] = ()) -> Path:
         """The file to write, by this name if none or a folder is given; or a refusal.
 
         It has the ending of the name. Neither it nor a file `beside` it with these endings may exist, unless it is to
@@ -53,7 +53,7 @@ class OneFile:
         whole, own = file / name if file.is_dir() else file, Path(name).suffix
         if whole.suffix.lower() != own:
             _checks.refuse("file", f"be a folder or a file NAME{own}", whole, f"Try {whole.stem}{own}.")
-        for each in (whole, *(whole.with_name(f"{whole.stem}{ending}") for ending in beside)):
+        for each in (whole, *(whole.with_name(f"{whole.stem}{ending}") for ending in others)):
             if each.exists() and not self.replace:
                 _checks.refuse("file", "be a new file", each, "Give another name, or --replace.")
         return whole

@@ -109,7 +109,7 @@ def fit(
         return
     names = law_names(law, points=table is not None)
     options = _options(how, rig)
-    beside = None if baseline is None else read_law("baseline", baseline)
+    reference = None if baseline is None else read_law("baseline", baseline)
     if report is not None and group_by is not None:
         _checks.refuse("report", "be left out with --group-by, which writes a page for each group", str(report))
     with job(screen, "fit", output, report, resume=resume) as work:
@@ -128,7 +128,7 @@ def fit(
         if options["scheduled"] and cross_validate:
             remedy = "Records at each inner command are predicted without them anyway; --group-by command fits apart."
             _checks.refuse("cross_validate", "be left out where the records state several commands", "given", remedy)
-        Fits(work, names, options, preflight, remarks, cross_validate, beside).of_all(groups, held)
+        Fits(work, names, options, preflight, remarks, cross_validate, reference).of_all(groups, held)
 
 
 def _given(**options: object) -> list[str]:

@@ -116,7 +116,7 @@ def tune_command(
     """
     damper = given_law(law)
     car = parse_vehicle(vehicle)(damper)
-    beside = None if baseline is None else read_baseline(baseline, car)
+    reference = None if baseline is None else read_baseline(baseline, car)
     surfaces, run = _realisations(road, driving, roads)
     car = controlling.of(car, damper)
     if controlling.controller is not None:
@@ -131,7 +131,7 @@ def tune_command(
         result = tuned(screen, call)
         with work.saving("Law, vehicle and tables") as draft:
             write_tuning(draft, result)
-        work.page(tuning_report, result, baseline=beside)
+        work.page(tuning_report, result, baseline=reference)
     exit_code_of(result)
 
 
@@ -244,7 +244,7 @@ def sweep_command(
     names = [name for word in metric for name in _metrics_of("metric", word, car, white=white)]
     names = list(dict.fromkeys([*names, *limits]))
     limit_spans(limits, names, dict.fromkeys(names, 1.0))  # refuses what is no limit before anything is driven
-    beside = None if baseline is None else read_baseline(baseline, car)
+    reference = None if baseline is None else read_baseline(baseline, car)
     ride = Ride(car, surface, metrics=names, **run)
     axes = grid(axes_in_si(over, car)).values
     ride({name: values[0] for name, values in axes.items() if not ride.out_of_domain({name: values[:1]})[0]})
@@ -260,7 +260,7 @@ def sweep_command(
         at = _present(car, axes)
         at_start = {name: float(value) for name, value in ride(at if len(at) == len(axes) else None).items()}
         spans = limit_spans(limits, names, at_start)
-        before = None if beside is None else dict(ride.of_vehicle(beside)())
+        before = None if reference is None else dict(ride.of_vehicle(reference)())
         table = points_table(data, spans)
         _show_points(screen, table, lambda: best_points(data, spans, before), limited=bool(spans))
         remarks += stationary_notes(ride.vehicle, surface) if isinstance(surface, WhiteRoad) else []
@@ -291,8 +291,8 @@ def _comfort_and_grip(car: AbstractVehicle, names: Sequence[str], *, white: bool
 
 def _present(car: AbstractVehicle, over: Mapping[str, np.ndarray]) -> dict[str, float]:
     """The values that the vehicle has of the axes; those left out that stand for several different ones."""
-    known = {p.path: float(p.value) for p in named_parameters(car, over) if not np.shape(p.value)}
-    values = {name: {known[path] for path in match_paths(list(known), [name])} for name in over}
+    numbers = {p.path: float(p.value) for p in named_parameters(car, over) if not np.shape(p.value)}
+    values = {name: {numbers[path] for path in match_paths(list(numbers), [name])} for name in over}
     return {name: value.pop() for name, value in values.items() if len(value) == 1}
 
 

@@ -155,7 +155,7 @@ def sensor_words(given: Sequence[Named], rides: Sequence[RideRecord]) -> dict[st
 def guide_words(body: str, numbers: Mapping[str, float], car: AbstractVehicle) -> tuple[Guide, list[str]]:
     """The guide of "sprung:friction=40,damping=100", and the paths of its free numbers."""
     numbers = dict(numbers)
-    _checks.one_of("guide", body, [known.name for known in car.frame().bodies])
+    _checks.one_of("guide", body, [part.name for part in car.frame().bodies])
     friction, velocity = numbers.pop("friction", None), numbers.pop("friction_velocity", FRICTION_VELOCITY)
     law = None if friction is None else CoulombFriction(friction, velocity)
     free = [name for name in numbers if name != "ahead"] + ["law.friction_force"] * (law is not None)
@@ -164,13 +164,13 @@ def guide_words(body: str, numbers: Mapping[str, float], car: AbstractVehicle) -
 
 def bench_words(texts: Sequence[str], car: AbstractVehicle) -> dict[str, BenchSet]:
     """The bench records of "damper=FILE", by the path of the law; of "FILE" where there is only one law."""
-    known, files = damper_paths(car), dict[str, list[Path]]()
+    dampers, files = damper_paths(car), dict[str, list[Path]]()
     for text in texts:
         path, equals, file = (part.strip() for part in text.partition("="))
-        if not equals or path not in known:
-            if len(known) != 1:
-                _checks.refuse("bench", f"name one of the laws {', '.join(known)}", repr(text), "Write LAW=FILE.")
-            path, file = known[0], text
+        if not equals or path not in dampers:
+            if len(dampers) != 1:
+                _checks.refuse("bench", f"name one of the laws {', '.join(dampers)}", repr(text), "Write LAW=FILE.")
+            path, file = dampers[0], text
         files.setdefault(path, []).append(Path(file))
     return {path: bench.read(paths) for path, paths in files.items()}
 

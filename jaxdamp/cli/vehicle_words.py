@@ -156,9 +156,9 @@ def write_laws(folder: Path, vehicle: AbstractVehicle) -> None:
 
 def damper_places(vehicle: AbstractVehicle) -> list[str]:
     """The paths of the dampers of a vehicle."""
-    known = damper_paths(vehicle)
-    places = matching(known, "*damper")
+    dampers = damper_paths(vehicle)
+    places = matching(dampers, "*damper")
     if not places:
         remedy = "Leave the law out, to take those of the vehicle."
-        _checks.refuse("vehicle", "have a law whose path ends with 'damper'", ", ".join(known) or "none", remedy)
+        _checks.refuse("vehicle", "have a law whose path ends with 'damper'", ", ".join(dampers) or "none", remedy)
     return places

@@ -38,7 +38,7 @@ def pairs(option: str, texts: Sequence[str], like: str = "NAME=VALUE") -> list[t
         name, equals, value = (piece.strip() for piece in part.partition("="))
         if not equals or not name or not value:
             _checks.refuse(option, f"read like {like}", repr(part))
-        if name in (known for known, _ in pairs):
+        if name in (earlier for earlier, _ in pairs):
             _checks.refuse(option, "name each thing once", f"twice {name!r}")
         pairs.append((name, value))
     return pairs
@@ -227,7 +227,7 @@ def axes(option: str, given: Sequence[str]) -> dict[str, Axis]:
     return axes
 
 
-def named_numbers(known: Mapping[str, float | None], example: str) -> Callable[[str, Sequence[str]], list[Named]]:
+def named_numbers(defaults: Mapping[str, float | None], example: str) -> Callable[[str, Sequence[str]], list[Named]]:
     """The reader of texts such as "stroke:offset,delay=0.001".
 
     It gives the owner and its numbers of each text; those without a value take that of `known`.
@@ -247,9 +247,9 @@ def named_numbers(known: Mapping[str, float | None], example: str) -> Callable[[
         numbers: dict[str, float] = {}
         for part in rest.split(","):
             name, equals, value = (piece.strip() for piece in part.partition("="))
-            _checks.one_of(option, name, known)
+            _checks.one_of(option, name, defaults)
             try:
-                number = float(value) if equals else known[name]
+                number = float(value) if equals else defaults[name]
             except ValueError:
                 number = None
             if number is None:

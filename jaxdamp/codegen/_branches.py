@@ -80,8 +80,8 @@ def where(statements: Sequence[Statement], conditions: Mapping[str, bool], resul
         if not isinstance(s, Define) or s.operation != "select":
             return s
         condition, yes, no = s.operands
-        known = conditions.get(condition.name) if isinstance(condition, Variable) else None
-        return s if known is None else Define(s.target, "copy", (yes if known else no,))
+        value = conditions.get(condition.name) if isinstance(condition, Variable) else None
+        return s if value is None else Define(s.target, "copy", (yes if value else no,))
 
     return pruned(changed(statements, chosen), results)
 

@@ -124,9 +124,9 @@ def _level(atom: Atom | None, levels: dict[str, int]) -> int:
     return levels[atom.name] if isinstance(atom, Variable) else 0
 
 
-def _levels(statements: Iterable[Statement], known: dict[str, int]) -> dict[str, int]:
+def _levels(statements: Iterable[Statement], given: dict[str, int]) -> dict[str, int]:
     """What each value depends on; what loops and branches assign is taken to depend on all."""
-    levels = dict(known)
+    levels = dict(given)
     for statement in each(statements):
         if isinstance(statement, Declare):
             levels[statement.target.name] = OF_BOTH

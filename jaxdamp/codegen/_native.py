@@ -114,10 +114,10 @@ def _compiled(command: list[str], build: Build) -> str | None:
 
 def _lasting_folder() -> Path | None:
     """Beside the compiled programs of JAX, if these are kept, in a folder that only this user can write."""
-    kept = getattr(jax.config, "jax_compilation_cache_dir", None)
-    if not kept or "://" in kept or not hasattr(os, "getuid"):
+    cache = getattr(jax.config, "jax_compilation_cache_dir", None)
+    if not cache or "://" in cache or not hasattr(os, "getuid"):
         return None
-    folder = Path(kept) / "printed"
+    folder = Path(cache) / "printed"
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         state = folder.stat()
@@ -174,9 +174,9 @@ class Compiler(NamedTuple):
         library, major, minor, count = ctypes.CDLL(path), ctypes.c_int(), ctypes.c_int(), ctypes.c_int()
         library.nvrtcVersion(ctypes.byref(major), ctypes.byref(minor))
         library.nvrtcGetNumSupportedArchs(ctypes.byref(count))
-        known = (ctypes.c_int * count.value)()
-        library.nvrtcGetSupportedArchs(known)
-        return cls(library, (major.value, minor.value), frozenset(known))
+        numbers = (ctypes.c_int * count.value)()
+        library.nvrtcGetSupportedArchs(numbers)
+        return cls(library, (major.value, minor.value), frozenset(numbers))
 
 
 class Kernel(NamedTuple):

@@ -263,17 +263,17 @@ def _tested(
     condition: list[Statement], leave: Statement, given: Mapping[Variable, Atom | None], suffix: str
 ) -> tuple[list[_Straight], Atom]:
     """The condition of a loop for given values of its variables, and its result."""
-    known: dict[Atom, Atom] = {variable: value for variable, value in given.items() if value is not None}
+    constants: dict[Atom, Atom] = {variable: value for variable, value in given.items() if value is not None}
     test: list[_Straight] = []
     for s in condition:
         if not isinstance(s, Define):
             message = "A loop in the condition of a loop cannot be printed for many points side by side."
             raise NotImplementedError(message)
         target = Variable(s.target.name + suffix, s.target.dtype)
-        test.append(Define(target, s.operation, tuple(known.get(a, a) for a in s.operands)))
-        known[s.target] = target
+        test.append(Define(target, s.operation, tuple(constants.get(a, a) for a in s.operands)))
+        constants[s.target] = target
     assert isinstance(leave, Leave)
-    return test, known.get(leave.unless, leave.unless)
+    return test, constants.get(leave.unless, leave.unless)
 
 
 def _points(going: Variable) -> str:

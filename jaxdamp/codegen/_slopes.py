@@ -99,8 +99,8 @@ def _text(signature: Signature, program: Program, numbers: set[str], of_numbers:
     value, slope = ([*np.ravel(np.asarray(part, object))] for part in program.results)
     once, lane = _split(program.statements, lanes)
     before, once = _hoisted(once, set(numbers))
-    known = numbers | {statement.target.name for statement in before}
-    before_lane, lane = _hoisted(lane, known | of_numbers)
+    hoisted = numbers | {statement.target.name for statement in before}
+    before_lane, lane = _hoisted(lane, hoisted | of_numbers)
     used = names([*value, *slope]) | names_in([*once, *lane])
     if names(value) & written(lane):
         raise NotImplementedError("A value is computed together with its derivatives.")
@@ -164,15 +164,15 @@ def _split(statements: Sequence[Statement], lanes: set[str]) -> tuple[list[State
     return [s for s, yes in both if not yes], [s for s, yes in both if yes]
 
 
-def _hoisted(statements: Sequence[Statement], known: set[str]) -> tuple[list[Define], list[Statement]]:
+def _hoisted(statements: Sequence[Statement], constants: set[str]) -> tuple[list[Define], list[Statement]]:
     """Results of operations on what is known before, and the other statements; `known` grows."""
     early: list[Define] = []
     later: list[Statement] = []
     for statement in statements:
         kinds = ("float64", "bool")
-        if isinstance(statement, Define) and statement.target.dtype in kinds and names_in([statement]) <= known:
+        if isinstance(statement, Define) and statement.target.dtype in kinds and names_in([statement]) <= constants:
             early.append(statement)
-            known.add(statement.target.name)
+            constants.add(statement.target.name)
         else:
             later.append(statement)
     return early, later

@@ -120,11 +120,11 @@ class Controlled(AbstractVehicle):
             remedy = "Such as `control.Sensors(stroke=control.SignalSensor(noise=1e-4))`."
             _checks.instance("sensors", one, (Sensors, type(None)), "be `Sensors`, or a dict of them by damper", remedy)
         for name in dampers:
-            known = _checks.concrete(forces[name])
-            if known is not None and not np.any(np.ptp(known, axis=1)):
+            concrete = _checks.concrete(forces[name])
+            if concrete is not None and not np.any(np.ptp(concrete, axis=1)):
                 must = "have a force that changes at once with its command"
                 remedy = 'Blend the forces of its levels, `blend="force"`, or put its lag into `actuator_lag`.'
-                always = f"one that is {known[0, 0]:g} N at {float(self.still):g} m/s always"
+                always = f"one that is {concrete[0, 0]:g} N at {float(self.still):g} m/s always"
                 _checks.refuse(name, must, always, remedy)
 
     def commanded(self, dampers: Sequence[str]) -> tuple[tuple[str, ...], AbstractVehiclePolicy]:

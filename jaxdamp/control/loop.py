@@ -151,10 +151,10 @@ class ControlLoop(eqx.Module):
         number = first + jnp.arange(count, dtype=dt.dtype)
         every, late = jnp.round(self.period / dt), jnp.round(self.delay / dt)
         sample, apply = ((jnp.mod(number - start, every) == 0.0).astype(dt.dtype) for start in (0.0, late))
-        samples, known = jnp.floor(number / every), _checks.concrete(dt)
-        if known is None:
+        samples, concrete = jnp.floor(number / every), _checks.concrete(dt)
+        if concrete is None:
             return Flags(sample, apply, noise_of(self.sensors, samples))
-        of_samples = samples[0] + jnp.arange(count // max(round(self.period / float(known)), 1) + 2, dtype=dt.dtype)
+        of_samples = samples[0] + jnp.arange(count // max(round(self.period / float(concrete)), 1) + 2, dtype=dt.dtype)
         noise = noise_of(self.sensors, of_samples)  # drawn once for each sample
         return Flags(sample, apply, None if noise is None else noise[(samples - samples[0]).astype(int)])
 

@@ -228,9 +228,9 @@ Weights: TypeAlias = tuple[Scalar, Scalar, Scalar]
 def _weights(frequency: Scalar, period: float) -> Weights:
     """Of y, of u before and of u now in y after a period of y' = ω (u − y), for a u that is straight over it."""
     z = 2.0 * jnp.pi * frequency * period
-    kept = jnp.exp(-z)
+    decay = jnp.exp(-z)
     mean = -jnp.expm1(-z) / z
-    return kept, mean - kept, 1.0 - mean
+    return decay, mean - decay, 1.0 - mean
 
 
 @final
@@ -249,7 +249,7 @@ class _TwoLags(AbstractPolicy):
         """The demanded force [N]."""
         (last, *lags), velocity = state, seen.body_velocity
         high, low = (
-            kept * lag + before * last + now * velocity
-            for (kept, before, now), lag in zip((self.high, self.low), lags, strict=True)
+            filtered * lag + before * last + now * velocity
+            for (filtered, before, now), lag in zip((self.high, self.low), lags, strict=True)
         )
         return self.gain * (high - low), (velocity, high, low)

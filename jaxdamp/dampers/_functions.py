@@ -34,8 +34,8 @@ def by_name(leaf: object) -> object:
     if not callable(leaf):
         return leaf
     of_jax = [NamedFunction(place, getattr(leaf, "__name__", "")) for place in ("jax.nn", "jax.numpy", "jax.lax")]
-    known = [place for place in of_jax if hasattr(import_module(place.module), place.name)]
-    return next((place for place in (*known, *_PLACES) if place.function() is leaf), leaf)
+    places = [place for place in of_jax if hasattr(import_module(place.module), place.name)]
+    return next((place for place in (*places, *_PLACES) if place.function() is leaf), leaf)
 
 
 def with_functions(law: Law) -> Law:

@@ -135,8 +135,8 @@ class AbstractDamper(Module):
         """
         if not any(law.traits().temperature_dependent for law in self.inner_laws()):
             return self
-        known = [law.at_temperature(temperature) for law in self.inner_laws()]
-        return eqx.tree_at(lambda law: law.inner_laws(), self, known)
+        inner = [law.at_temperature(temperature) for law in self.inner_laws()]
+        return eqx.tree_at(lambda law: law.inner_laws(), self, inner)
 
     def values_at_start(self, temperature: ScalarLike) -> dict[str, ScalarLike]:
         """Own numbers that a temperature [K] at the first instant of a motion sets, by name; none by default."""

@@ -162,12 +162,12 @@ class Besinger(AbstractMemoryless):
 
     def plainer(self, undetermined: Sequence[str], fastest: float) -> AbstractMemoryless:
         """Without blow-off where it is not known; else a curve that bends less, or straight lines."""
-        known = 5 - len(self.without_effect(fastest)) - len(undetermined)
+        determined = 5 - len(self.without_effect(fastest)) - len(undetermined)
         if not {"blow_off_rate", "limit_velocity"}.isdisjoint(undetermined):
             limit = 2.0 * fastest
             rate = transition_rate(limit, self.compression_rate, self.rebound_rate, self.transition_velocity)
             return dataclasses.replace(self, blow_off_rate=rate, limit_velocity=limit)
-        return plainer_curve(self, known, fastest)
+        return plainer_curve(self, determined, fastest)
 
     def without_effect(self, fastest: float) -> tuple[str, ...]:
         """The blow-off, if the valve opens at none of these velocities."""

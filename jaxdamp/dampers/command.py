@@ -53,11 +53,11 @@ def check_commands(argument: str, law: AbstractDamper, commands: ArrayLike) -> N
     """
     if not takes_command(law):
         _checks.refuse(argument, "be left out beside a law that takes none", repr(law), TAKING)
-    known = _checks.concrete(commands)
-    if known is None:
+    concrete = _checks.concrete(commands)
+    if concrete is None:
         return
-    _checks.finite(argument, known)
-    lowest, highest = float(known.min()), float(known.max())
+    _checks.finite(argument, concrete)
+    lowest, highest = float(concrete.min()), float(concrete.max())
     for levels in [_checks.concrete(s.levels) for _, s in modules_inside(law) if isinstance(s, Scheduled)]:
         if levels is None:
             continue

@@ -59,9 +59,11 @@ def require_finite_force(law: AbstractDamper, force: ArrayLike, where: str) -> N
         force: its forces [N].
         where: for the message, such as "over the whole motion".
     """
-    known = _checks.concrete(force)
-    if known is not None and not np.all(np.isfinite(known)):
-        missing = f"{type(law).__name__} with none at {np.count_nonzero(~np.isfinite(known))} of {known.size} samples"
+    concrete = _checks.concrete(force)
+    if concrete is not None and not np.all(np.isfinite(concrete)):
+        missing = (
+            f"{type(law).__name__} with none at {np.count_nonzero(~np.isfinite(concrete))} of {concrete.size} samples"
+        )
         _checks.refuse("law", f"give a finite force {where}", missing, coverage(law))
 
 

@@ -134,8 +134,8 @@ def _temperatures(law: AbstractDamper, motion: Motion) -> np.ndarray:
     """The oil temperatures [K] that are set around a law and inside it."""
     inside = [inner for _, inner in law.motion_inside(motion)]
     deeper = [t for part, inner in law.motion_inside(motion) for t in _temperatures(part, inner)]
-    known = {motion.temperature, *(inner.temperature for inner in inside), *deeper} - {None}
-    return np.array(sorted(t for t in known if t is not None))
+    temperatures = {motion.temperature, *(inner.temperature for inner in inside), *deeper} - {None}
+    return np.array(sorted(t for t in temperatures if t is not None))
 
 
 def sentence(name: str, uses: Sequence[RangeUse]) -> str:

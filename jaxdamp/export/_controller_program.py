@@ -49,12 +49,12 @@ class SampledController(eqx.Module):
         self.laws, self.dt = tuple(laws[port] for port in loop.ports), dt
         parts = {field.name: getattr(loop, field.name) for field in dataclasses.fields(loop)}
         geometry = {n: y for n, y in parts.items() if isinstance(y, LinearMap) or getattr(y, "ndim", 0) == 2}
-        known = jax.tree.map(jnp.zeros_like, geometry)  # of the vehicle, where signals come from
-        known |= {"ports": tuple(range(len(loop.ports)))}
-        known |= {"sensors": with_sensors(loop.sensors, lambda sensors: sensors.outside())}
+        fields = jax.tree.map(jnp.zeros_like, geometry)  # of the vehicle, where signals come from
+        fields |= {"ports": tuple(range(len(loop.ports)))}
+        fields |= {"sensors": with_sensors(loop.sensors, lambda sensors: sensors.outside())}
         if not any(law.initial_state().size for law in self.laws):
-            known |= {"delay": 0.0, "actuator_lag": jnp.zeros_like(loop.actuator_lag), "rate_limit": None}
-        self.loop = dataclasses.replace(loop, **known)
+            fields |= {"delay": 0.0, "actuator_lag": jnp.zeros_like(loop.actuator_lag), "rate_limit": None}
+        self.loop = dataclasses.replace(loop, **fields)
         self.sampler = Sampler(self.loop, self.laws, MemoryLayout.SCALARS, dt)
 
     def begin(self, seen: tuple[Signals, ...]) -> ControllerState:

@@ -312,8 +312,8 @@ def _of_metric(metric: Metric, vehicle: AbstractVehicle) -> Contents:
     title = metric_words(metric.name) + (f", {metric.weighting}" if metric.weighting else "")
     unit, main = metric.unit(vehicle.units), bool(_MAIN.match(metric.name))
     turned = display().sign == COMPRESSION and display().signed(metric.name)
-    known = {"name": metric.name, "title": title, "unit": unit, "main": main}
-    return known | {"signed": metric.statistic.signed, "turned": turned}
+    entry = {"name": metric.name, "title": title, "unit": unit, "main": main}
+    return entry | {"signed": metric.statistic.signed, "turned": turned}
 
 
 def _of_roads(speed: float, duration: float, seed: int, road_class: str) -> Contents:

@@ -38,20 +38,20 @@ def ties_at(at: AtSetting, level: str, tie: Mapping[str, str] | None) -> dict[st
     return {place(path): place(leader) for path, leader in free_parameters(at.model, tie=names, move=True).ties}
 
 
-def choices_at(at: AtSetting, level: str, asked: Free, beside: Collection[str]) -> AtLevel:
+def choices_at(at: AtSetting, level: str, asked: Free, others: Collection[str]) -> AtLevel:
     """The choices at one setting; `beside` are numbers of the machine that are free beside other settings only.
 
     What the fit of this setting alone held, it holds here too.
     """
-    place, known = placed(at, level), [p.path for p in parameters(at.model)]
-    free = {p.path: p.path for p in at.free.chosen} | dict(at.free.ties) | {path: path for path in beside}
-    held = [path for path in known if path not in free and not path.startswith(OF_RIG)]
-    frozen = match_paths(known, own_names(at.model).find("freeze", name_patterns("freeze", asked["freeze"])))
+    place, paths = placed(at, level), [p.path for p in parameters(at.model)]
+    free = {p.path: p.path for p in at.free.chosen} | dict(at.free.ties) | {path: path for path in others}
+    held = [path for path in paths if path not in free and not path.startswith(OF_RIG)]
+    frozen = match_paths(paths, own_names(at.model).find("freeze", name_patterns("freeze", asked["freeze"])))
     held += [path for path in frozen if path.startswith(OF_RIG)]
 
     def of_free(argument: str, given: Mapping[str, tuple[float, float]] | None) -> Limits:
         pairs = own_names(at.model).find_keys(argument, given).items()
-        return {place(free[path]): pair for name, pair in pairs for path in match_paths(known, [name]) if path in free}
+        return {place(free[path]): pair for name, pair in pairs for path in match_paths(paths, [name]) if path in free}
 
     return AtLevel([*map(place, held)], of_free("bounds", asked["bounds"]), of_free("priors", asked["priors"]))
 

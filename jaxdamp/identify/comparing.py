@@ -228,12 +228,12 @@ def fit_each(
     named = {**of_fits, "freeze": name_patterns("freeze", settings["freeze"])}
     naming = any(named.get(option) for option in NAMED)
     begun = [_begun(law, runs, rig) for law in laws.values()] if naming else []
-    known, in_time = list(map(_paths, begun)), scheduled or _differ_by_record(begun, settings["per_record"])
+    paths, in_time = list(map(_paths, begun)), scheduled or _differ_by_record(begun, settings["per_record"])
 
     sent = (*runs, *held_out)
 
     def given(name: str, start: Start, held: tuple[str, ...] = ()) -> tuple[object, ...]:
-        own = naming_only(named, _paths(_begun(start, runs, rig)), known) if known else named
+        own = naming_only(named, _paths(_begun(start, runs, rig)), paths) if paths else named
         own = {**own, "rig": rig, "freeze": (*own["freeze"], *frozen_by(laws[name]), *held)}
         return name, start, tuple(runs), tuple(held_out), scheduled, in_time, len(laws) > 1, own
 

@@ -164,8 +164,8 @@ def side_by_side(
     """The outcome of each start in their order, as soon as it is available, several in threads at the same time."""
     # A thread begins with the precision of the process, not with that of its caller.
     double = jnp.result_type(float) == jnp.float64
-    beside = _second_process.count()
-    count = 1 + beside if beside else min(usable_cores(), MOST_THREADS)
+    processes = _second_process.count()
+    count = 1 + processes if processes else min(usable_cores(), MOST_THREADS)
     outcomes = {name: Future[Outcome]() for name in starts}
     left = deque(starts)
 
@@ -173,7 +173,7 @@ def side_by_side(
         """The first thread begins with the simplest, whose results come first, others with what takes longest."""
         while left:
             try:
-                name = left.pop() if number and beside else left.popleft()
+                name = left.pop() if number and processes else left.popleft()
             except IndexError:
                 return
             try:

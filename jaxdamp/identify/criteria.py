@@ -130,8 +130,8 @@ def _refuse_held(free: FreeParameters, name: str) -> None:
     for path in matching(list(leaders), name):
         remedy = f"Give the prior of {leaders[path]!r}."
         _checks.refuse(argument, must, f"of {path}, which is tied to {leaders[path]}", remedy)
-    known = list(free.tree) if isinstance(free.tree, dict) else [p.path for p in parameters(free.tree, commands=True)]
-    for path in matching(known, name):
+    paths = list(free.tree) if isinstance(free.tree, dict) else [p.path for p in parameters(free.tree, commands=True)]
+    for path in matching(paths, name):
         remedy = "Leave its prior out, or free it by `freeze`, `over` or `rig`."
         _checks.refuse(argument, must, f"of {path}, which is frozen", remedy)
 
@@ -213,10 +213,10 @@ def _without_its_own_noise(
 
     What a wrong prior makes a fit miss counts as noise, beside which it weighs the more.
     """
-    problem, beside = fitted[0], fitted[1].noise or 0.0
-    alone = solve(problem.at_noise(NEXT_TO_NOTHING * beside), starts).best
+    problem, noise_of_records = fitted[0], fitted[1].noise or 0.0
+    alone = solve(problem.at_noise(NEXT_TO_NOTHING * noise_of_records), starts).best
     level = noise(problem, alone).level if alone.finite else np.inf
-    if not level < QUIETER * beside or problem.is_rounding(alone.squares):
+    if not level < QUIETER * noise_of_records or problem.is_rounding(alone.squares):
         return fitted
     weighed = problem.at_noise(level)
     return weighed, solve(weighed.started_at(alone.values), 1)._replace(noise=level)

@@ -38,7 +38,7 @@ class Goal:
     @classmethod
     def of(
         cls,
-        known: "Information",
+        information: "Information",
         criterion: str,
         function: Callable[[PyTree], PyTree] | None,
         prior: Mapping[str, float] | None,
@@ -48,7 +48,7 @@ class Goal:
         A zero is no size to compare with: in its place is the largest value of its vector, else its prior, else the
         change that moves the force by its RMS.
         """
-        free = known.free
+        free = information.free
         values, paths = np.abs(np.asarray(free.values, float)), np.array([p.path for p in free.owners])
         deviations = np.full(values.size, np.nan)
         for name, deviation in (prior or {}).items():
@@ -56,7 +56,7 @@ class Goal:
             deviations[np.isin(paths, match_paths(list(dict.fromkeys(paths.tolist())), [name]))] = deviation
         stated = np.isfinite(deviations)
         scale = np.where(values > 0, values, [np.max(values[paths == path]) for path in paths])
-        scale = np.where(scale > 0, scale, np.where(stated, deviations, known.large))
+        scale = np.where(scale > 0, scale, np.where(stated, deviations, information.large))
         spread = np.where(stated, deviations, VAGUE * scale)
         slopes = np.zeros(values.size) if function is None else _slopes(function, free)
         return cls(criterion, scale, np.diag((scale / spread) ** 2), slopes * scale)
@@ -211,9 +211,9 @@ class Pool:
         left_out = tuple(filter(None, over))
         if len(left_out) == len(over):
             refuse_all(left_out)
-        kept = [item for item, words in zip(candidates.items(), over, strict=True) if not words]
+        within = [item for item, words in zip(candidates.items(), over, strict=True) if not words]
         matrices = information.matrices[[not words for words in over]]
-        return cls([k for k, _ in kept], [t for _, t in kept], matrices, information.free, left_out)
+        return cls([k for k, _ in within], [t for _, t in within], matrices, information.free, left_out)
 
     def joined(self, other: "Pool") -> "Pool":
         """Both together."""

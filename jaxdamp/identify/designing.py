@@ -225,7 +225,7 @@ def design_experiment(
     covariance = goal.covariance(pool.matrices[chosen].sum(axis=0))
     left_out += pool.left_out if tests is not None else ()
     best, firm = [pool.tests[k] for k in chosen], np.sqrt(np.diag(covariance)) <= WEAK * goal.scale
-    weak = tuple(name for name, known in zip(pool.free.names, firm, strict=True) if not known)
+    weak = tuple(name for name, sure in zip(pool.free.names, firm, strict=True) if not sure)
     design = ExperimentDesign(
         law,
         _named(best),
@@ -325,11 +325,11 @@ def _compared(
     limits: MachineLimits | None,
 ) -> ExperimentDesign:
     """The design beside a programme of tests."""
-    known = informed(programme)
-    each = zip(programme, known.force, known.power, strict=True)
+    information = informed(programme)
+    each = zip(programme, information.force, information.power, strict=True)
     over = [words for test, force, power in each if (words := beyond(test, limits, force, power))]
-    beside = [f"The machine cannot run {len(over)} of the {len(programme)} tests of the programme: {listed(over)}."]
-    of_programme = known.matrices.sum(axis=0)
+    notes = [f"The machine cannot run {len(over)} of the {len(programme)} tests of the programme: {listed(over)}."]
+    of_programme = information.matrices.sum(axis=0)
     aim = float(goal.value(of_programme))
     longest = goal.added(chosen, max(len(programme) - len(chosen), 0), pool.matrices)
     reached = goal.value(np.cumsum(pool.matrices[longest[: len(programme)]], axis=0)) <= aim
@@ -340,5 +340,5 @@ def _compared(
         programme_covariance=covariance,
         runs_to_match=int(np.argmax(reached)) + 1 if np.any(reached) else None,
         function_errors=(design.function_errors[0], goal.function_error(covariance)),
-        warnings=(*design.warnings, *beside * bool(over)),
+        warnings=(*design.warnings, *notes * bool(over)),
     )

@@ -78,8 +78,8 @@ def parameter_table(title: str, estimates: Sequence[Estimate], truth: Module | N
     columns += [Column("with what the law misses", spec=".2g")] * spread
     columns += [Column("true", spec=".5g"), Column("(value − true)/se", spec="+.1f")] * (truth is not None)
     columns += [Column("95 % from", spec=".5g"), Column("to", spec=".5g"), Column("note"), Column("meaning")]
-    known = None if truth is None else free_parameters(truth)
-    true_values = dict(zip(known.names, np.asarray(known.values).tolist(), strict=True)) if known else {}
+    of_truth = None if truth is None else free_parameters(truth)
+    true_values = dict(zip(of_truth.names, np.asarray(of_truth.values).tolist(), strict=True)) if of_truth else {}
     rows: list[tuple[Cell, ...]] = []
     for e in estimates:
         value, error = rounded(e.value, e.standard_error)

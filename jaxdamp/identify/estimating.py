@@ -129,8 +129,8 @@ def _weakly_known(problem: Problem) -> tuple[Bool[np.ndarray, " free"], Float[np
         for path, deviation in zip(part.paths, np.asarray(part.deviation), strict=True)
     }
     each = [np.ravel(sizes.get(p.path, np.full(p.value.shape, np.nan))) for p in problem.free.chosen]
-    known = np.concatenate(each)
-    return np.isfinite(known), known
+    deviations = np.concatenate(each)
+    return np.isfinite(deviations), deviations
 
 
 def _estimates(

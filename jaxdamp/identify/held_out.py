@@ -115,8 +115,8 @@ def _quarters(runs: Sequence[BenchRun], *, alike: bool) -> str:
 
 def _reached(runs: Sequence[BenchRun], part: Part) -> Part:
     """The samples left out whose velocity the others reach."""
-    known = np.concatenate([run.velocity[~left] for run, left in zip(runs, part, strict=True)])
-    reached = [(run.velocity >= known.min()) & (run.velocity <= known.max()) for run in runs]
+    velocities = np.concatenate([run.velocity[~left] for run, left in zip(runs, part, strict=True)])
+    reached = [(run.velocity >= velocities.min()) & (run.velocity <= velocities.max()) for run in runs]
     return tuple(left & near for left, near in zip(part, reached, strict=True))
 
 

@@ -175,8 +175,8 @@ def gas_in_words(
     constant += ["rig.force_offset", "rig.gas_force"] * (rig_of(model) is not None)
     names = [e.name for e in estimates]
     of_gas = np.array([name.startswith(gas) for name in names], bool)
-    beside = of_gas | np.isin(names, constant)
-    mixed = np.any(_alike(covariance) & np.outer(beside, beside) & (of_gas[:, None] | of_gas), axis=0)
+    set_apart = of_gas | np.isin(names, constant)
+    mixed = np.any(_alike(covariance) & np.outer(set_apart, set_apart) & (of_gas[:, None] | of_gas), axis=0)
     if not mixed.any():
         return []
     pressures = [name.removeprefix(inside) for name in names if name.startswith(gas) and name.endswith("pressure")]

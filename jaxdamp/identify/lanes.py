@@ -141,17 +141,19 @@ def by_rounds(
 def _without_their_own_noise(
     lanes: Lanes,
     end: SearchLanes,
-    beside: Float[np.ndarray, " dampers"],
+    noise_beside: Float[np.ndarray, " dampers"],
     solve: Callable[[Lanes, Float[np.ndarray, "lanes free"]], SearchLanes],
     depends: Dependence | None,
 ) -> tuple[Lanes, SearchLanes]:
     """Priors beside the noise of fits without them, where that is less: as `criteria.solve_by`, for each damper."""
-    free = [problem.at_noise(NEXT_TO_NOTHING * noise) for problem, noise in zip(lanes.problems, beside, strict=True)]
+    free = [
+        problem.at_noise(NEXT_TO_NOTHING * noise) for problem, noise in zip(lanes.problems, noise_beside, strict=True)
+    ]
     alone, problems = solve(Lanes.of(free, lanes.force_noise), end.y), list(lanes.problems)
     for i, (y, squares) in enumerate(zip(alone.y, alone.aux[:, -1, -1], strict=True)):
         residual = lanes.searches[i].here(y).whole[:, -1]
         level = np.sqrt(lanes.mean(i, lanes.variances(i, residual, y.size)))
-        if squares > ROUNDING**2 and level < QUIETER * beside[i]:
+        if squares > ROUNDING**2 and level < QUIETER * noise_beside[i]:
             problems[i] = problems[i].at_noise(level)
     weighed = Lanes.of(problems, lanes.force_noise)
     wrong = [one is not before for one, before in zip(problems, lanes.problems, strict=True)]

@@ -70,8 +70,8 @@ class AbstractFitted(AbstractResult):
 
     def _model_of(self, runs: Sequence[BenchRun]) -> Model:
         """`model`, with the estimated states at the beginning of those of these records that were fitted."""
-        known = {run.fingerprint: start for run, start in zip(self.runs, self.record_starts, strict=False)}
-        starts = [known.get(run.fingerprint) for run in runs] if known else ()
+        by_record = {run.fingerprint: start for run, start in zip(self.runs, self.record_starts, strict=False)}
+        starts = [by_record.get(run.fingerprint) for run in runs] if by_record else ()
         return on_rig(self.law, self.rig, starts)
 
     @overload

@@ -219,13 +219,13 @@ def control_charts(
     centre, deviation, share, alike = (np.full(values.shape[1], np.nan) for _ in range(4))
     for j, name in enumerate(columns):
         there = values[some, j]
-        known = np.isfinite(there)
-        if np.count_nonzero(known) < FEWEST or np.ptp(there[known]) == 0.0:
+        finite = np.isfinite(there)
+        if np.count_nonzero(finite) < FEWEST or np.ptp(there[finite]) == 0.0:
             must = f"hold {FEWEST} or more dampers that determine {name!r} and are not all alike"
-            _checks.refuse("baseline", must, f"{np.count_nonzero(known)} of {some.size} such dampers")
-        there = there[known]
+            _checks.refuse("baseline", must, f"{np.count_nonzero(finite)} of {some.size} such dampers")
+        there = there[finite]
         centre[j], deviation[j] = there.mean(), np.mean(np.abs(np.diff(there))) / D2
-        share[j] = np.mean(errors[some, j][known] ** 2) / deviation[j] ** 2
+        share[j] = np.mean(errors[some, j][finite] ** 2) / deviation[j] ** 2
         alike[j] = np.corrcoef(there[:-1], there[1:])[0, 1]
     chosen = (Shewhart(), Ewma(), Cusum()) if charts is None else tuple(charts)
     if not chosen:

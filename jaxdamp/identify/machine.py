@@ -267,13 +267,13 @@ def with_static_force_on_machine(problem: Problem, solution: Solution) -> tuple[
     velocity = np.concatenate([run.velocity for run in problem.fitted_to])
     if not velocity.min() < 0.0 < velocity.max():
         return problem, solution
-    beside = float(velocity[velocity <= 0.0].max()), float(velocity[velocity >= 0.0].min())
+    nearest = float(velocity[velocity <= 0.0].max()), float(velocity[velocity >= 0.0].min())
 
     def at_rest(values: np.ndarray) -> float:
         """The force [N] between those at the slowest samples in both directions: zero velocity may not be sampled."""
         law = law_of(free.started_at(values).tree)
-        forces = [force_at(law, v) for v in beside]
-        return float(np.interp(0.0, beside, forces))
+        forces = [force_at(law, v) for v in nearest]
+        return float(np.interp(0.0, nearest, forces))
 
     unit = at_rest(np.asarray(free.values) + moved) - at_rest(np.asarray(free.values))
 

@@ -242,9 +242,9 @@ def _rows(path: Path, identity: Mapping[str, str], records: AllRecords, count: i
         _checks.refuse("file", "lie in a folder that exists", path, "Make the folder first.")
     with FileLock(path.with_name(f".{path.name}.lock")):
         blocks = stored_blocks(path)
-        known = _known(stamps) if not blocks else None
-        store = BlockStore(path, Blocks((blocks * BLOCK or len(known["name"]),), (BLOCK,)), identity)  # type: ignore
-        store.create(("damper",), variables, {}, known)
+        stamped = _known(stamps) if not blocks else None
+        store = BlockStore(path, Blocks((blocks * BLOCK or len(stamped["name"]),), (BLOCK,)), identity)  # type: ignore
+        store.create(("damper",), variables, {}, stamped)
         rows = _places(store)
         new = {name: stamp for name, stamp in stamps.items() if (name, stamp) not in rows}
         if new:

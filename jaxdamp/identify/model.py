@@ -160,8 +160,8 @@ class OwnNames(NamedTuple):
 def own_names(model: Model | VehicleTest) -> OwnNames:
     """How names of the law or the vehicle of a model are found in it."""
     part = fitted_part(model)
-    alone, beside = ([] if part is model else [p.path for p in parameters(tree)] for tree in (part, model))
-    return OwnNames(alone, beside, "vehicle." if isinstance(model, VehicleTest) else "law.")
+    alone, with_machine = ([] if part is model else [p.path for p in parameters(tree)] for tree in (part, model))
+    return OwnNames(alone, with_machine, "vehicle." if isinstance(model, VehicleTest) else "law.")
 
 
 def starts_in(model: object) -> tuple[RecordStart | None, ...]:
@@ -210,8 +210,8 @@ def count_states(model: Model) -> int:
 
 
 def _type(number: object) -> jax.ShapeDtypeStruct:
-    known = jax.typeof(number)
-    return jax.ShapeDtypeStruct(known.shape, known.dtype)
+    kind = jax.typeof(number)
+    return jax.ShapeDtypeStruct(kind.shape, kind.dtype)
 
 
 @functools.lru_cache(maxsize=256)

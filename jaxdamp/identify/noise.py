@@ -222,18 +222,18 @@ def autocorrelation(residual: Float[np.ndarray, " samples"]) -> Float[np.ndarray
     products = _products(residual) if order else np.zeros(1)
     if not products[0] > 0:
         return np.ones(1)
-    known = products / products[0]
+    correlation = products / products[0]
     coefficients, best, error, least = np.ones(1), np.ones(1), 1.0, 0.0
     for k in range(1, order + 1):
-        reflection = -float(coefficients @ known[k:0:-1]) / error
+        reflection = -float(coefficients @ correlation[k:0:-1]) / error
         padded = np.append(coefficients, 0.0)
         coefficients, error = padded + reflection * padded[::-1], error * (1.0 - reflection**2)
         criterion = count * np.log(max(error, np.finfo(float).tiny)) + PENALTY * k * np.log(count)
         best, least = (coefficients, criterion) if criterion < least else (best, least)
     if best.size == 1:
         return best
-    known = known[: best.size]  # the first lags are those of the residual, the others follow from them
-    return _continued(known, best, count)
+    correlation = correlation[: best.size]  # the first lags are those of the residual, the others follow from them
+    return _continued(correlation, best, count)
 
 
 def _continued(

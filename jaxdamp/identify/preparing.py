@@ -149,8 +149,8 @@ def begun(
     limits, tied = names.find_keys("bounds", bounds), names.find_keys("tie", tie)
     free = free_parameters(spread(model, own, len(runs)), freeze=frozen, bounds=limits, tie=tied, move=True)
     _checks.finite("law", free.values)
-    known = priors_on(free, names.find_keys("priors", priors))
-    return Beginning(begin, model, free, own, initial_state, (*known, *expected))
+    on_parameters = priors_on(free, names.find_keys("priors", priors))
+    return Beginning(begin, model, free, own, initial_state, (*on_parameters, *expected))
 
 
 def _records(runs: BenchRun | Iterable[BenchRun]) -> tuple[BenchRun, ...]:
@@ -180,9 +180,9 @@ def _with_estimated_states(
     return on_rig(law_of(model), rig_of(model), starts), (prior,), [str(path) for path in paths[~fitted]]
 
 
-def not_chosen(model: Model | VehicleTest, over: Sequence[str] | None, *beside: str) -> list[str]:
+def not_chosen(model: Model | VehicleTest, over: Sequence[str] | None, *prefixes: str) -> list[str]:
     """Paths of the law or the vehicle that `over` leaves out; all others, which begin with these words, stay free."""
-    paths = [p.path for p in parameters(model) if not p.path.startswith(beside)]
+    paths = [p.path for p in parameters(model) if not p.path.startswith(prefixes)]
     if over is None:
         return []
     chosen = match_paths(paths, own_names(model).find("over", over))
@@ -253,9 +253,9 @@ def weights(weighting: str | Sequence[float] | np.ndarray, runs: Sequence[BenchR
     sigma = [float(s) for s in weighting]
     if len(sigma) != len(runs):
         _checks.refuse("weighting", f"give one number for each of {len(runs)} records", f"{len(sigma)} numbers")
-    kept = np.array([s for s in sigma if s != np.inf])
-    _checks.positive("weighting", kept)
-    if not kept.size:
+    finite = np.array([s for s in sigma if s != np.inf])
+    _checks.positive("weighting", finite)
+    if not finite.size:
         _checks.refuse("weighting", "leave at least one record", "infinite for all")
     return sigma
 

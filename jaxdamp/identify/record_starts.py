@@ -111,11 +111,11 @@ def _states_with_force(force: Callable[[State], Array], expected: State, size: S
 
 def with_first_states(model: Model, runs: Sequence[BenchRun]) -> Model:
     """The model with states at the first sample of every record: those it has, or those by the force at rest."""
-    known = starts_in(model) or (None,) * len(runs)
-    if count_states(model) == 0 or all(start is not None for start in known):
+    estimated = starts_in(model) or (None,) * len(runs)
+    if count_states(model) == 0 or all(start is not None for start in estimated):
         return model
     states = first_states(on_rig(law_of(model), rig_of(model)), runs).at_rest
-    starts = [own or RecordStart(jnp.asarray(s)) for own, s in zip(known, states, strict=True)]
+    starts = [own or RecordStart(jnp.asarray(s)) for own, s in zip(estimated, states, strict=True)]
     return OnRig(law_of(model), rig_of(model), tuple(starts))
 
 

@@ -166,8 +166,8 @@ def _with_less(source: Rung, enough: float, fitted: Fitted, ahead: Ahead) -> Ite
             for other in others[: len(failed) < MOST_FAILURES - 1]:
                 following = (*left_out, other.words)
                 begun[following] = begun.get(following) or ahead(source, *_with_held(other.law, fastest))
-            known, (law, held) = begun.get((*left_out, part.words)), _with_held(part.law, fastest)
-            rung = _as_reduced(source, known() if known else fitted(source, law, held), held)
+            waiting, (law, held) = begun.get((*left_out, part.words)), _with_held(part.law, fastest)
+            rung = _as_reduced(source, waiting() if waiting else fitted(source, law, held), held)
             if rung:
                 yield rung
             if rung and rung.error <= enough:

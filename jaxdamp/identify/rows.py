@@ -35,8 +35,8 @@ class Row(NamedTuple):
 
 def averaged(values: np.ndarray, block: int) -> np.ndarray:
     """Means of successive blocks, the remainder dropped."""
-    kept = len(values) // block * block
-    return values[:kept].reshape(-1, block).mean(axis=1)
+    count = len(values) // block * block
+    return values[:count].reshape(-1, block).mean(axis=1)
 
 
 _rates: WeakKeyDictionary[BenchRun, float] = WeakKeyDictionary()  # records do not change

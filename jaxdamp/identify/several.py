@@ -82,8 +82,8 @@ def first_part(problem: Problem) -> Problem | None:
     stroke, velocity = signals(problem.residuals, "stroke", "velocity")
     for place in problem.places:
         factor[place] = _of_record(used[place], stroke[place], velocity[place])
-    count, kept = np.count_nonzero(used), np.count_nonzero(used & (factor > 0))
-    return problem.reweighted(factor) if count >= LEAST and kept <= MOST * count else None
+    count, counted = np.count_nonzero(used), np.count_nonzero(used & (factor > 0))
+    return problem.reweighted(factor) if count >= LEAST and counted <= MOST * count else None
 
 
 def _of_record(
@@ -99,8 +99,8 @@ def _of_record(
         for way in (signal, -signal):
             low, high = way[used].min(), way[used].max()
             last = max(last, samples[np.argmax(way[used] >= low + REACHED * (high - low))])
-    kept = np.arange(used.size) <= last
-    return np.where(kept, np.sqrt(samples.size / np.count_nonzero(used & kept)), 0.0)
+    part = np.arange(used.size) <= last
+    return np.where(part, np.sqrt(samples.size / np.count_nonzero(used & part)), 0.0)
 
 
 class _Searcher:
@@ -208,18 +208,18 @@ def _follow(searcher: _Searcher, others: Sequence[np.ndarray], best: SearchEnd, 
         return []
     steps, partly = min(FIRST_LOOK, max_steps), searcher.part is not None
     here = searcher.look(best.values, steps) if partly else best
-    looks, known = [searcher.look(values, steps) for values in others], [(here, best)]
+    looks, followed = [searcher.look(values, steps) for values in others], [(here, best)]
     variance = here.squares / np.count_nonzero(searcher.problem.used)
     if partly and _left(best, here, searcher.look(best.values, 1).squares, variance):
-        looks, known = [here, *looks], []
+        looks, followed = [here, *looks], []
     ends = [end for end in looks if end.converged]
     for look in _promising(here, looks)[:FOLLOWED]:
-        end = next((end for seen, end in known if seen.finite and _apart(look, seen) < SAME * variance), None)
+        end = next((end for seen, end in followed if seen.finite and _apart(look, seen) < SAME * variance), None)
         if end is None:
             # at least one point on all samples
             most = np.clip(max_steps, look.steps + partly, look.steps + FOLLOWED_STEPS)
             end = searcher.to_its_end(look, int(most))
-            known.append((look, end))
+            followed.append((look, end))
         ends.append(end)
     return ends
 

@@ -115,8 +115,8 @@ def check_start(argument: str, law: object) -> None:
         return
     if isinstance(law, str):
         laws = [name for name in dampers.__all__ if isinstance(getattr(dampers, name), type(AbstractDamper))]
-        known = next((name for name in laws if name.lower() == law.lower().replace("_", "")), None)
-        remedy = f"Write `dampers.{known}`." if known else f"Write `default_ladder(runs, [{law!r}])[{law!r}]`."
+        similar = next((name for name in laws if name.lower() == law.lower().replace("_", "")), None)
+        remedy = f"Write `dampers.{similar}`." if similar else f"Write `default_ladder(runs, [{law!r}])[{law!r}]`."
     elif callable(law) and not isinstance(law, type | BenchRun | eqx.Module):
         return
     else:

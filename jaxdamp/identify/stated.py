@@ -53,12 +53,14 @@ def stated_parameters(model: Model, runs: Sequence[BenchRun]) -> dict[str, list[
     names = {name for run in runs for name in run.settings if name != TEMPERATURE}
     if not names:
         return {}
-    known = {p.path: p for p in parameters(law_of(model))}
+    by_path = {p.path: p for p in parameters(law_of(model))}
     for name in names:
-        if not matching([*known], name):
-            refuse_misspelt(name, [TEMPERATURE, *known, *(path.rpartition(".")[2] for path in known)])
+        if not matching([*by_path], name):
+            refuse_misspelt(name, [TEMPERATURE, *by_path, *(path.rpartition(".")[2] for path in by_path)])
     inside = "" if law_of(model) is model else "law."
-    return {inside + path: _of_records(name, known[path], runs) for name in names for path in matching([*known], name)}
+    return {
+        inside + path: _of_records(name, by_path[path], runs) for name in names for path in matching([*by_path], name)
+    }
 
 
 def _of_records(name: str, parameter: Parameter, runs: Sequence[BenchRun]) -> list[float]:
@@ -109,8 +111,8 @@ def with_stated(model: Model, stated: Mapping[str, Sequence[float]]) -> Model:
 
 def start_paths(model: Model) -> list[str]:
     """Paths of the parameters that say only how warm a record begins, of laws and machines that warm up themselves."""
-    known = {p.path for p in parameters(model)}
-    return [path for path in at_start(model, 293.15) if path in known]
+    paths = {p.path for p in parameters(model)}
+    return [path for path in at_start(model, 293.15) if path in paths]
 
 
 def gas_charges(law: AbstractDamper) -> list[tuple[str, AbstractDamper]]:

@@ -157,13 +157,13 @@ def _batch(
     length = _round_up(max(len(row.weight) for row in rows))
     signals = zip(*(row.signals for row in rows), strict=True)
     columns = [on_device(np.stack([_pad(values, length) for values in channel])) for channel in signals]
-    stroke, velocity, force, *beside = columns
+    stroke, velocity, force, *others = columns
     weight = np.stack([_pad(row.weight, length, "constant") for row in rows])
     number = np.array([row.number for row in rows])
     dt, substeps = np.array([row.dt for row in rows]), max(row.substeps for row in rows)
     own = {path: on_device(np.array(values, float)[number]) for path, values in fixed.items()}
     arrays = (on_device(dt), stroke, velocity, force, on_device(weight), on_device(number))
-    followed = dict(zip(channels[3:], beside, strict=True))
+    followed = dict(zip(channels[3:], others, strict=True))
     return Batch(*arrays, own, per_record, substeps, cycle=cycles_of(rows, runs), effects=effects, **followed)
 
 

@@ -204,12 +204,12 @@ def fit_each_vehicle(
         checked_records(vehicle, (*rides, *held_out))
     sensors = dict(options.get("sensors") or {})
     tests = {name: VehicleTest(vehicle, sensors) for name, vehicle in vehicles.items()}
-    known = {name: [p.path for p in parameters(test)] for name, test in tests.items()}
+    by_vehicle = {name: [p.path for p in parameters(test)] for name, test in tests.items()}
     of_drives = name_patterns("per_record", options.get("per_record") or ())
-    in_time = any(matching(paths, name) for paths in known.values() for name in of_drives)
+    in_time = any(matching(paths, name) for paths in by_vehicle.values() for name in of_drives)
 
     def fitted(name: str, vehicle: AbstractVehicle) -> VehicleRung | Failure:
-        own = naming_only(options, known[name], known.values())
+        own = naming_only(options, by_vehicle[name], by_vehicle.values())
         try:
             result = fit_vehicle(vehicle, rides, **own)
             judged = on_drives(result, held_out) if held_out else without_drives(result, in_time=in_time)

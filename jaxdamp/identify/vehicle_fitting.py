@@ -239,9 +239,9 @@ def _judged(
     if not signs:  # what such a channel looks like is no lag of a sensor, and what friction looks like neither
         friction = friction_left_out(problem, end) if noise.inflation > 1.0 else None
         notes += [friction.sentence] if friction else []
-        known = [end.jacobian, friction.columns] if friction else [end.jacobian]
-        beside = end._replace(jacobian=np.concatenate(known, axis=1))
-        notes += on_sensors(problem, beside, data.rides, data.channels, model.sensors)
+        columns = [end.jacobian, friction.columns] if friction else [end.jacobian]
+        with_friction = end._replace(jacobian=np.concatenate(columns, axis=1))
+        notes += on_sensors(problem, with_friction, data.rides, data.channels, model.sensors)
     if noise.inflation > 1.0:
         notes.append(
             "Neighbouring residuals are alike: the vehicle or its sensors miss something systematic. The standard"

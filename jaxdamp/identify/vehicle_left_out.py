@@ -60,7 +60,7 @@ def on_signs(scores: Sequence[ChannelScore], at_start: Sequence[ChannelScore]) -
     return notes
 
 
-def on_units(at_start: Sequence[ChannelScore], known: Mapping[str, Sensor]) -> list[str]:
+def on_units(at_start: Sequence[ChannelScore], sensors: Mapping[str, Sensor]) -> list[str]:
     """A sentence on each channel that is like that of the vehicle of the start, but several times as large or small.
 
     Not on those whose sensor has a gain of its own.
@@ -69,7 +69,7 @@ def on_units(at_start: Sequence[ChannelScore], known: Mapping[str, Sensor]) -> l
         f"{score.channel} of {score.record} is {score.size:.2g} times what the vehicle of the start shows: its unit, or"
         " that of the other channels, is wrong, or the start is far off. State units by `read_rides(..., units={...})`."
         for score in at_start
-        if "gain" not in (known[score.channel].given if score.channel in known else ())
+        if "gain" not in (sensors[score.channel].given if score.channel in sensors else ())
         and max(score.size, 1.0 / max(score.size, 1e-300)) > ANOTHER_UNIT
         and abs(score.correlation) > ALIKE
     ]

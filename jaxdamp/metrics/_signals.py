@@ -50,9 +50,11 @@ def check_interval(dt: ScalarLike | int) -> None:
 
 def check_increasing(frequency: Float[Array, " lines"]) -> None:
     """Refuse known frequencies that do not increase."""
-    known = _checks.concrete(frequency)
-    if known is not None and not (known[1:] > known[:-1]).all():
-        _checks.refuse("frequency", "increase", f"{known[0]:g} to {known[-1]:g} Hz in another order", "Sort the lines.")
+    concrete = _checks.concrete(frequency)
+    if concrete is not None and not (concrete[1:] > concrete[:-1]).all():
+        _checks.refuse(
+            "frequency", "increase", f"{concrete[0]:g} to {concrete[-1]:g} Hz in another order", "Sort the lines."
+        )
 
 
 class StateSpace(NamedTuple):
@@ -98,15 +100,15 @@ def respond_exactly(system: StateSpace, signal: Signal, dt: ScalarLike, start: S
     n = system.input_vector.size
     growth, shift = np.zeros((n + 2, n + 2)), np.zeros((n + 2, n + 2))
     growth[:n, :n], growth[:n, n], shift[n, n + 1] = system.state_matrix, system.input_vector, 1.0
-    known = _checks.concrete(dt)
-    if known is None:
+    concrete = _checks.concrete(dt)
+    if concrete is None:
         step = jnp.asarray(dt, signal.dtype)
         growth = jnp.asarray(growth, signal.dtype) * step + jnp.asarray(shift, signal.dtype)
         rise = growth @ phi_functions(growth)[1]
     else:
         from scipy.linalg import expm
 
-        rise = jnp.asarray(expm(growth * float(known) + shift) - np.eye(n + 2), signal.dtype)
+        rise = jnp.asarray(expm(growth * float(concrete) + shift) - np.eye(n + 2), signal.dtype)
     output = jnp.asarray(system.output_vector, signal.dtype)
     rest = np.zeros(n, signal.dtype) if start is None else jnp.full(n, start, signal.dtype)
     return _run(rise, output, jnp.asarray(system.feed_through, signal.dtype), signal, rest)

@@ -71,9 +71,11 @@ def smooth_peak(signal: SignalLike, order: ScalarLike | int = 16) -> Scalar:
     """
     x = as_signal("signal", signal)
     _checks.finite("order", order)
-    known = _checks.concrete(order)
-    if known is not None and known < 2.0:
-        _checks.refuse("order", "be at least 2", known, "Use `rms` for 2 and larger orders to come closer to the peak.")
+    concrete = _checks.concrete(order)
+    if concrete is not None and concrete < 2.0:
+        _checks.refuse(
+            "order", "be at least 2", concrete, "Use `rms` for 2 and larger orders to come closer to the peak."
+        )
     p = jnp.asarray(order, x.dtype)
     largest = jax.lax.stop_gradient(jnp.max(jnp.abs(x)))
     zero = largest == 0.0

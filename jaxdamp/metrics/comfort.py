@@ -139,11 +139,11 @@ def comfort_reaction(total_value: ScalarLike) -> tuple[str, ...]:
     >>> comfort_reaction(0.55)
     ('a little uncomfortable', 'fairly uncomfortable')
     """
-    known = _checks.concrete(total_value)
-    if known is None:
+    concrete = _checks.concrete(total_value)
+    if concrete is None:
         _checks.refuse("total_value", "be known: texts cannot be compiled", "traced", "Call it outside compiled code.")
     _checks.nonnegative("total_value", total_value, "It is a weighted RMS acceleration in m/s^2.")
-    value = float(known)
+    value = float(concrete)
     return tuple(word for word, low, high in _REACTIONS if low <= value < high)
 
 

@@ -12,9 +12,9 @@ from jaxdamp.metrics._signals import as_numbers, as_signal, check_interval
 
 
 def _check_band(band: ScalarLike | float) -> None:
-    known = _checks.concrete(band)
-    if known is not None and not 0.0 < known < 1.0:
-        _checks.refuse("band", "lie between 0 and 1", known, "It is a part of the peak: write 0.05 for 5 %.")
+    concrete = _checks.concrete(band)
+    if concrete is not None and not 0.0 < concrete < 1.0:
+        _checks.refuse("band", "lie between 0 and 1", concrete, "It is a part of the peak: write 0.05 for 5 %.")
 
 
 def settling_time(
@@ -120,9 +120,9 @@ def logarithmic_decrement(signal: SignalLike, *, final: ScalarLike | int = 0.0, 
     """
     x = as_signal("signal", signal, least=5)
     _checks.finite("final", final)
-    known = _checks.concrete(threshold)
-    if known is not None and not 0.0 <= known < 1.0:
-        _checks.refuse("threshold", "be at least 0 and below 1", known, "It is a part of the largest turning point.")
+    concrete = _checks.concrete(threshold)
+    if concrete is not None and not 0.0 <= concrete < 1.0:
+        _checks.refuse("threshold", "be at least 0 and below 1", concrete, "It is a part of the largest turning point.")
     return _decrement(x - jnp.asarray(final, x.dtype), jnp.asarray(threshold, x.dtype))
 
 

@@ -152,11 +152,11 @@ def dissipation_histogram(
 def _edges(edges: VectorLike, velocity: Signal, width: ScalarLike | int) -> Float[Array, " edges"]:
     _checks.nonnegative("width", width, "It is the width of an edge in m/s.")
     limits = jnp.asarray(edges, velocity.dtype)
-    known = _checks.concrete(limits)
+    concrete = _checks.concrete(limits)
     if limits.ndim != 1 or limits.size < 2:
         _checks.refuse("edges", "hold two or more velocities", f"of shape {limits.shape}")
-    if known is not None and not np.all(known[1:] > known[:-1]):
-        _checks.refuse("edges", "increase", known, "Sort them; the outer ones may be infinite.")
+    if concrete is not None and not np.all(concrete[1:] > concrete[:-1]):
+        _checks.refuse("edges", "increase", concrete, "Sort them; the outer ones may be infinite.")
     return limits
 
 

@@ -113,45 +113,45 @@ class Metric:
 RENAMED = {"working_space_peak": "working_space_peak_to_peak"}
 
 
-def current_name(name: str, known: Collection[str]) -> str:
+def current_name(name: str, names: Collection[str]) -> str:
     """The current name of a metric: for a renamed one the new name, with a `FutureWarning`.
 
     Arguments:
         name: of a metric, perhaps an earlier one.
-        known: all current names.
+        names: all current names.
     """
-    new = _new_name(name, known)
+    new = _new_name(name, names)
     if new is None:
         return name
     warn(f"The metric {name!r} is now called {new!r}; use that name.", FutureWarning)
     return new
 
 
-def _new_name(name: object, known: Collection[str]) -> str | None:
-    if isinstance(name, str) and name not in known:
+def _new_name(name: object, names: Collection[str]) -> str | None:
+    if isinstance(name, str) and name not in names:
         for old, new in RENAMED.items():
             corner = name.removesuffix(old)
-            if corner != name and corner[-1:] in ("", "_") and corner + new in known:
+            if corner != name and corner[-1:] in ("", "_") and corner + new in names:
                 return corner + new
     return None
 
 
-def current_names(argument: str, names: Sequence[str], known: Collection[str]) -> list[str]:
+def current_names(argument: str, names: Sequence[str], valid: Collection[str]) -> list[str]:
     """The current names of these metrics.
 
     Arguments:
         argument: its name in messages.
         names: of metrics, perhaps earlier ones.
-        known: all current names.
+        valid: all current names.
 
     Raises:
         ValueError: an unknown name, with the nearest known one; a single text instead of a list.
     """
     if isinstance(names, str):
         _checks.refuse(argument, "be a list of names", repr(names), f"Write `{argument}=[{names!r}]`.")
-    current = [current_name(name, known) for name in names]
+    current = [current_name(name, valid) for name in names]
     for name in current:
-        _checks.one_of(argument, name, known)
+        _checks.one_of(argument, name, valid)
     return current
 
 

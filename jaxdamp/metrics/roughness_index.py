@@ -170,12 +170,12 @@ def _rates(
 ) -> tuple[Float[Array, " shorter"], float]:
     """|z_s' - z_u'| after each sample, and the distance between samples [m]."""
     heights = as_signal("profile", profile, least=2)
-    known = _checks.concrete(spacing)
-    if known is None:
+    concrete = _checks.concrete(spacing)
+    if concrete is None:
         _checks.refuse("spacing", "be known when the code is compiled", "traced", "Close over a plain number.")
     _checks.positive("spacing", spacing, "It is the distance between samples in m.")
     _checks.nonnegative("moving_average", moving_average, "Use 0 for no moving average.")
-    distance = float(known)
+    distance = float(concrete)
     if distance > 0.3:
         _checks.refuse("spacing", "not exceed 0.3 m", distance, "Sample the road more closely; it is in m.")
     length = (heights.size - 1) * distance

@@ -270,12 +270,12 @@ def weighted_signal(
         signal = signal - jnp.mean(signal)
     if method == "step":
         return respond_exactly(cascade(weighting), signal, dt)
-    known = _checks.concrete(dt)
-    if known is None:
+    concrete = _checks.concrete(dt)
+    if concrete is None:
         remedy = 'Close over dt as a plain number, mark it static in jax.jit, or take method="step".'
         _checks.refuse("dt", 'be known when the code is compiled for the method "spectrum"', "traced", remedy)
-    size = _fast_length(signal.size + math.ceil(settling(weighting) / float(known)))
-    frequency = jnp.arange(size // 2 + 1, dtype=signal.dtype) / (size * float(known))
+    size = _fast_length(signal.size + math.ceil(settling(weighting) / float(concrete)))
+    frequency = jnp.arange(size // 2 + 1, dtype=signal.dtype) / (size * float(concrete))
     return _filtered(signal, weighting_response(frequency, weighting))
 
 

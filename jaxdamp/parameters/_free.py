@@ -28,11 +28,13 @@ from jaxdamp.parameters._paths import (
 INSIDE = 0.02  # of the width of bounds, by which a start is moved inside
 
 
-def resolve_ties(known: Sequence[Parameter], tie: Mapping[str, str] | None, *, move: bool = False) -> dict[str, str]:
+def resolve_ties(
+    parameters: Sequence[Parameter], tie: Mapping[str, str] | None, *, move: bool = False
+) -> dict[str, str]:
     """The path whose value each tied parameter takes.
 
     Arguments:
-        known: all parameters of the tree.
+        parameters: all parameters of the tree.
         tie: names or patterns of the parameters that follow, each with the name or pattern of those they follow; what a
             `*` or `**` stands for must be the same on both sides. A name without `*` may lead several parameters.
         move: whether the values of partners may differ, as those of a start.
@@ -41,7 +43,7 @@ def resolve_ties(known: Sequence[Parameter], tie: Mapping[str, str] | None, *, m
         ValueError: names that fit no parameter or no partner; a parameter tied twice or in a circle; partners of
             another unit, shape or domain, or with another value to start from.
     """
-    by_path, leaders = {p.path: p for p in known}, {}
+    by_path, leaders = {p.path: p for p in parameters}, {}
     for follower, leader in (tie or {}).items():
         candidates = match_paths(list(by_path), [leader])
         for path in match_paths(list(by_path), [follower]):
@@ -145,10 +147,10 @@ class FreeParameters(eqx.Module):
     def split(self, vector: Array | np.ndarray) -> list[PyTree]:
         """A vector of numbers cut into the shapes of the parameters."""
         ends = np.cumsum([p.value.size for p in self.chosen])[:-1]
-        known = not isinstance(vector, Tracer)  # whose operations JAX would compile
-        pieces = (np if known else jnp).split(np.asarray(vector) if known else vector, ends)
+        on_host = not isinstance(vector, Tracer)  # whose operations JAX would compile
+        pieces = (np if on_host else jnp).split(np.asarray(vector) if on_host else vector, ends)
         shaped = [piece.reshape(p.value.shape) for piece, p in zip(pieces, self.chosen, strict=True)]
-        return shaped if not isinstance(vector, Array) or not known else [jnp.asarray(a, a.dtype) for a in shaped]
+        return shaped if not isinstance(vector, Array) or not on_host else [jnp.asarray(a, a.dtype) for a in shaped]
 
     def build(self, values: Float[Array, " free"]) -> PyTree:
         """The tree with these physical values, unchecked."""
@@ -213,27 +215,27 @@ def free_parameters(
     _checks.untraced("bounds", dict(bounds or {}), "Give plain numbers, which are known before a program is compiled.")
     names = ["**"] if over is None else name_patterns("over", over)
     all_parameters = _known(tree, names, tie)
-    known = [p.path for p in all_parameters]
-    if not known:
+    every_path = [p.path for p in all_parameters]
+    if not every_path:
         remedy = "Declare its numbers by `parameter(unit, meaning)`; the weights of a network are trained by optax."
         _checks.refuse("law", "have parameters", f"a {type(tree).__name__} without", remedy)
     keep = match_parameters(all_parameters, names)
-    frozen = match_paths(known, name_patterns("freeze", freeze))
+    frozen = match_paths(every_path, name_patterns("freeze", freeze))
     leaders = resolve_ties(all_parameters, tie, move=move)
 
     def group(paths: Sequence[str]) -> set[str]:
         return {leaders.get(path, path) for path in paths}
 
     free = group(keep) - group(frozen)
-    limits = limits_by_path(known, free, leaders, bounds or {})
-    linear = free - {leader for path, leader in leaders.items() if not all_parameters[known.index(path)].linear}
+    limits = limits_by_path(every_path, free, leaders, bounds or {})
+    linear = free - {leader for path, leader in leaders.items() if not all_parameters[every_path.index(path)].linear}
     chosen = [
         dataclasses.replace(p, domain=_limited(p, limits.get(p.path), move=move), linear=p.linear and p.path in linear)
         for p in all_parameters
         if p.path in free
     ]
     if not chosen:
-        raise ValueError(f"All parameters are frozen, nothing is left to change: {', '.join(known)}.")
+        raise ValueError(f"All parameters are frozen, nothing is left to change: {', '.join(every_path)}.")
     begun = FreeParameters(tree, tuple(chosen), tuple(pair for pair in leaders.items() if pair[1] in free))
     return _moved_inside(begun, limits, move=move)
 
@@ -260,7 +262,7 @@ def _known(tree: object, names: Sequence[str], tie: Mapping[str, str] | None) ->
 
 
 def limits_by_path(
-    known: Sequence[str],
+    paths: Sequence[str],
     free: Collection[str],
     leaders: Mapping[str, str],
     bounds: Mapping[str, tuple[float, float]],
@@ -268,7 +270,7 @@ def limits_by_path(
     """Extra limits by path, checked. If two names match a parameter, the later one counts.
 
     Arguments:
-        known: all paths.
+        paths: all paths.
         free: those that may change; a bound of another one is refused.
         leaders: the path whose value each tied parameter takes.
         bounds: a lower and an upper limit by name or pattern.
@@ -280,7 +282,7 @@ def limits_by_path(
         if not numbers or not pair[0] < pair[1]:
             remedy = "For a side without a limit, give a number that is never reached."
             _checks.refuse(f"bounds[{name!r}]", "be two finite numbers in increasing order", pair, remedy)
-        named = [leaders.get(path, path) for path in match_paths(known, [name])]
+        named = [leaders.get(path, path) for path in match_paths(paths, [name])]
         if free and not {*free} & set(named):
             remedy = "Remove it from `freeze`, or leave out its bounds: frozen parameters need none."
             _checks.refuse(f"bounds[{name!r}]", "bound a parameter that is free", "one that is not", remedy)

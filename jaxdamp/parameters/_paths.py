@@ -98,8 +98,8 @@ def get(tree: object, path: str) -> PyTree:
             else:
                 tree = tree[part] if isinstance(tree, dict) else getattr(tree, part)
         except (AttributeError, LookupError, ValueError):
-            known = [p.path for p in parameters(whole)]
-            raise LookupError(f"Nothing is at the path {path!r}: {_nearest(known, path)}") from None
+            paths = [p.path for p in parameters(whole)]
+            raise LookupError(f"Nothing is at the path {path!r}: {_nearest(paths, path)}") from None
     return tree
 
 
@@ -132,11 +132,11 @@ def replace(tree: Tree, values: Mapping[str, object]) -> Tree:
     >>> float(replace(Linear(1500.0), {"rate": 2000.0}).rate)
     2000.0
     """
-    known = named_parameters(tree, values)
+    chosen = named_parameters(tree, values)
     by_path: dict[str, object] = {}
     named: dict[str, str] = {}
     for name, value in values.items():
-        for path in match_parameters(known, [name]):
+        for path in match_parameters(chosen, [name]):
             if path in named:
                 both = f"{named[path]!r} and {name!r}, which both name {path}"
                 _checks.refuse("values", "name each parameter once", both, "Write the paths of all of them.")
@@ -167,18 +167,20 @@ def _may_name_commands(name: str) -> bool:
     return "*" not in name.rpartition(".")[2]
 
 
-def match_parameters(known: Sequence[Parameter], names: Sequence[str]) -> list[str]:
+def match_parameters(parameters: Sequence[Parameter], names: Sequence[str]) -> list[str]:
     """The paths that names and patterns stand for (`match_paths`), those of commands only by their own name.
 
     Arguments:
-        known: of `named_parameters`.
+        parameters: of `named_parameters`.
         names: names and patterns.
     """
-    hits = [match_paths([p.path for p in known if not p.command or _may_name_commands(name)], [name]) for name in names]
-    return [p.path for p in known if any(p.path in paths for paths in hits)]
+    hits = [
+        match_paths([p.path for p in parameters if not p.command or _may_name_commands(name)], [name]) for name in names
+    ]
+    return [p.path for p in parameters if any(p.path in paths for paths in hits)]
 
 
-def match_paths(known: Sequence[str], patterns: Sequence[str]) -> list[str]:
+def match_paths(paths: Sequence[str], patterns: Sequence[str]) -> list[str]:
     """The known paths that names and patterns stand for.
 
     A name is a whole path, or the last parts of paths if no path is equal to it. In a pattern a `*` stands for text
@@ -187,7 +189,7 @@ def match_paths(known: Sequence[str], patterns: Sequence[str]) -> list[str]:
     `"*_rate"`, is compared with the last part of every path.
 
     Arguments:
-        known: all paths.
+        paths: all paths.
         patterns: names, last parts of names, or patterns with `*` and `**`.
 
     Raises:
@@ -199,24 +201,24 @@ def match_paths(known: Sequence[str], patterns: Sequence[str]) -> list[str]:
     """
     chosen = []
     for pattern in [patterns] if isinstance(patterns, str) else patterns:
-        hits = matching(known, pattern)
+        hits = matching(paths, pattern)
         if not hits:
-            raise ValueError(f"No parameter is named {pattern!r}: {_nearest(known, pattern)}")
+            raise ValueError(f"No parameter is named {pattern!r}: {_nearest(paths, pattern)}")
         chosen += [p for p in hits if p not in chosen]
-    return [p for p in known if p in chosen]
+    return [p for p in paths if p in chosen]
 
 
-def matching(known: Sequence[str], pattern: str) -> list[str]:
+def matching(paths: Sequence[str], pattern: str) -> list[str]:
     """The known paths that one name or pattern stands for, as in `match_paths`; none if there is no such path.
 
     Arguments:
-        known: all paths.
+        paths: all paths.
         pattern: a name, last parts of a name, or a pattern.
     """
     exact = re.compile(expression(pattern))
-    whole = [] if "*" in pattern and "." not in pattern else [path for path in known if exact.fullmatch(path)]
+    whole = [] if "*" in pattern and "." not in pattern else [path for path in paths if exact.fullmatch(path)]
     inside = re.compile(rf"(?:.*\.)?{expression(pattern)}")
-    return whole or [path for path in known if inside.fullmatch(path)]
+    return whole or [path for path in paths if inside.fullmatch(path)]
 
 
 def expression(pattern: str) -> str:
@@ -226,16 +228,16 @@ def expression(pattern: str) -> str:
     return "".join(groups.get(piece) or re.escape(piece) for piece in pieces)
 
 
-def _nearest(known: Sequence[str], pattern: str) -> str:
+def _nearest(paths: Sequence[str], pattern: str) -> str:
     """What could be meant by a name or pattern that fits no path."""
-    every = f"The parameters are {', '.join(known)}."
+    every = f"The parameters are {', '.join(paths)}."
     if "*" not in pattern:
-        near = get_close_matches(pattern, list(known) + [p.rsplit(".", 1)[-1] for p in known], 1)
+        near = get_close_matches(pattern, list(paths) + [p.rsplit(".", 1)[-1] for p in paths], 1)
         return (f"did you mean {near[0]!r}? " if near else "") + every
     across = re.sub(r"\*+", "**", pattern)
-    if across != pattern and (deeper := matching(known, across)):
+    if across != pattern and (deeper := matching(paths, across)):
         return f"a `*` stands for text without a dot. {across!r} would be {listed(deeper)}."
-    near = get_close_matches(pattern, known, 3, 0.3)
+    near = get_close_matches(pattern, paths, 3, 0.3)
     return (f"the nearest are {', '.join(near)}. " if near else "") + every
 
 
@@ -249,15 +251,15 @@ def listed(paths: Sequence[str], most: int = 6) -> str:
     return ", ".join(paths[:most]) + f" and {len(paths) - most} more" * (len(paths) > most)
 
 
-def matched_in_words(known: Sequence[str], **patterns: Iterable[str] | None) -> str:
+def matched_in_words(paths: Sequence[str], **patterns: Iterable[str] | None) -> str:
     """What each pattern with `*` stands for, as in "freeze 'guides.*.stiffness' = guides.0.stiffness"; else empty.
 
     Arguments:
-        known: all paths.
+        paths: all paths.
         patterns: names and patterns by the argument that they were given for; None for none.
     """
     return "; ".join(
-        f"{argument} {pattern!r} = {listed(matching(known, pattern))}"
+        f"{argument} {pattern!r} = {listed(matching(paths, pattern))}"
         for argument, given in patterns.items()
         for pattern in ([given] if isinstance(given, str) else given or ())
         if "*" in pattern

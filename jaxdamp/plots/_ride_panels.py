@@ -241,8 +241,8 @@ def damper(panels: Sequence[Axes], shown: _rides.Rides, path: str) -> None:
     """A damper before and after over mm/s: its force, its damping ratio, and the share of time at each velocity."""
     curves, *damping, shares = panels
     velocities = [_rides.damper_velocity(shown, path, number) for number in (0, 1)]
-    known = [np.abs(v).max() for v in velocities if v is not None]
-    reach = 1.05 * float(max(known)) if known else 1.0
+    peaks = [np.abs(v).max() for v in velocities if v is not None]
+    reach = 1.05 * float(max(peaks)) if peaks else 1.0
     several = _draw_law(curves, damping, shown, path, np.linspace(-reach, reach, 401))
     for _, style, number in shown.styles():
         velocity = velocities[number]

@@ -79,10 +79,10 @@ def _driven(response: Response, values: np.ndarray) -> tuple[np.ndarray, np.ndar
     frequency, excited = welch(rate, dt, size)
     gain = np.full(excited.size, np.nan, complex)  # where the road has no power
     np.divide(csd(rate, values, 1.0 / dt, nperseg=size)[1], excited, out=gain, where=excited > 0.0)
-    known = (frequency > 0.8 * LOWEST) & (frequency < 1.2 * HIGHEST)
-    known[known] = excited[known] > _EXCITED * excited[known].max()
-    frequency = frequency[known]
-    points, squares = smoothed(frequency, (2.0 * np.pi * frequency * np.abs(gain[known])) ** 2)
+    measured = (frequency > 0.8 * LOWEST) & (frequency < 1.2 * HIGHEST)
+    measured[measured] = excited[measured] > _EXCITED * excited[measured].max()
+    frequency = frequency[measured]
+    points, squares = smoothed(frequency, (2.0 * np.pi * frequency * np.abs(gain[measured])) ** 2)
     return points, np.sqrt(squares)
 
 

@@ -115,10 +115,10 @@ class Rides:
 
     def change(self, name: str, after: float) -> float | None:
         """The change of a metric [%]; none where the tables have none: from zero, and of one that may be negative."""
-        before, known = self.values[0][name], self.cars[0].ride_metrics
+        before, metrics = self.values[0][name], self.cars[0].ride_metrics
         if self.tuning is not None:
             return change_in_percent(self.tuning, name, before, after)
-        return None if any(m.name == name and m.statistic.signed for m in known) else percent_change(before, after)
+        return None if any(m.name == name and m.statistic.signed for m in metrics) else percent_change(before, after)
 
     @property
     def passive(self) -> tuple[AbstractVehicle, AbstractVehicle]:

@@ -40,8 +40,8 @@ class _Damper:
     @classmethod
     def of(cls, result: Comparison | FitResult | Evaluation, evaluation: Evaluation | None) -> "_Damper":
         if isinstance(result, Evaluation):
-            known = result.gas_and_friction
-            gas = {name: known[name].gas_force if name in known else 0.0 for name in result.settings}
+            forces = result.gas_and_friction
+            gas = {name: forces[name].gas_force if name in forces else 0.0 for name in result.settings}
             return cls(result, None, None, {}, gas, "Damper records")
         rung, fit = (result.best, result.best.result) if isinstance(result, Comparison) else (None, result)
         measured = evaluate(fit.runs) if evaluation is None else evaluation
@@ -319,8 +319,8 @@ def _parameters(axes: Axes, damper: _Damper) -> None:
             factor, unit = (1e3, "ms") if e.unit == "s" else (shown.factor, typeset_unit(shown.unit, "–"))
             half = max(abs(end - e.value) for end in e.interval)  # the side that no edge of the range cuts
             value, error = rounded(factor * e.value, factor * half)
-            known = f"{value} ± {error}".replace("-", "−")
-            text = f"{_style.short(factor * e.value)}  ({e.note})" if e.note else known
+            plain = f"{value} ± {error}".replace("-", "−")
+            text = f"{_style.short(factor * e.value)}  ({e.note})" if e.note else plain
             rows.append([_style.path_words(e.name), text, unit])
             colours.append(_style.BAD if e.note else _style.BLACK)
         title, headings = "Parameters, ± 95 %", ["", "value", "unit"]

@@ -71,12 +71,12 @@ def damping_ratio(
 
 def _dampers(critical: Mapping[str, Mapping[str, CriticalDamping]], damper: str | None) -> list[str]:
     """The dampers to draw, checked: that one, or all that every vehicle has."""
-    known = [name for name in next(iter(critical.values())) if all(name in each for each in critical.values())]
-    if not known:
+    names = [name for name in next(iter(critical.values())) if all(name in each for each in critical.values())]
+    if not names:
         _checks.refuse("vehicles", "have a damper between a body and a wheel of its own", "vehicles without one")
     if damper is not None:
-        _checks.one_of("damper", damper, known)
-    return known if damper is None else [damper]
+        _checks.one_of("damper", damper, names)
+    return names if damper is None else [damper]
 
 
 def ratios(

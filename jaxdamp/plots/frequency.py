@@ -50,13 +50,13 @@ def harmonic_response(result: HarmonicResponse, channels: Sequence[str] | None =
         result: of `simulation.harmonic_response`.
         channels: to draw; the first acceleration, stroke and tyre load of the vehicle if left out.
     """
-    known = result.layout.channels
+    by_name = result.layout.channels
     if channels is None:
         channels = [
-            next(c.name for c in known if c.kind is kind) for kind in DRAWN if any(c.kind is kind for c in known)
+            next(c.name for c in by_name if c.kind is kind) for kind in DRAWN if any(c.kind is kind for c in by_name)
         ]
     gains = {channel: np.abs(np.asarray(result.gain(channel))) for channel in channels}
-    units = {c.name: (c.unit, 1.0) for c in known} | {c.name: ("N", 1e-3) for c in known if c.unit == "N"}
+    units = {c.name: (c.unit, 1.0) for c in by_name} | {c.name: ("N", 1e-3) for c in by_name if c.unit == "N"}
     panels = []
     for channel in channels:
         unit, factor = units[channel]
@@ -123,9 +123,9 @@ def third_octaves(
     Each side is a label, a look and a spectrum (frequencies, densities).
     """
     octaves = [np.stack([np.asarray(a) for a in metrics.third_octave_rms(*each, weighting)]) for *_, each in sides]
-    known = np.all([np.isfinite(rms) for _, rms in octaves], axis=0)
-    largest = np.max([np.where(known, rms, 0.0) for _, rms in octaves], axis=0)
-    drawn = np.flatnonzero(known & (largest > _FELT * largest.max()))
+    finite = np.all([np.isfinite(rms) for _, rms in octaves], axis=0)
+    largest = np.max([np.where(finite, rms, 0.0) for _, rms in octaves], axis=0)
+    drawn = np.flatnonzero(finite & (largest > _FELT * largest.max()))
     bands = slice(drawn[0], drawn[-1] + 1) if drawn.size else slice(None)
     for number, ((label, style, _), (centre, rms)) in enumerate(zip(sides, octaves, strict=True)):
         ends = np.append(centre[bands] * 10.0**-0.05, centre[bands][-1:] * 10.0**0.05)

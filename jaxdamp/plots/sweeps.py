@@ -91,10 +91,12 @@ def sweep(
     spans = limit_spans(limits, names)
     for name in spans:
         _checks.one_of("limits", name, names)
-    known = {name: float(_checks.plain_number(f"present[{name!r}]", value)) for name, value in (present or {}).items()}
+    at_present = {
+        name: float(_checks.plain_number(f"present[{name!r}]", value)) for name, value in (present or {}).items()
+    }
     figure = _style.new_figure(7.0, 4.6)
     plot = figure.add_subplot()
-    shown = _Shown(figure, plot, data, metric, _ends(data, spans), known)
+    shown = _Shown(figure, plot, data, metric, _ends(data, spans), at_present)
     over_axes = " and ".join(_words(data, name) for name in axes)
     idle = without_effect(data).get(metric, [])
     flat = f" (no effect of {' and '.join(_words(data, name) for name in idle)})" if idle else ""
@@ -280,8 +282,8 @@ def _unbeaten(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The points than which no other one is smaller in both, by the first."""
     order = np.lexsort((y, x))
     x, y = x[order], y[order]
-    kept = y < np.minimum.accumulate(np.append(np.inf, y))[:-1]
-    return x[kept], y[kept]
+    unbeaten = y < np.minimum.accumulate(np.append(np.inf, y))[:-1]
+    return x[unbeaten], y[unbeaten]
 
 
 def _more_than(plot: Axes, x: np.ndarray, y: np.ndarray, values: np.ma.MaskedArray, smallest: float) -> None:

@@ -43,9 +43,9 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> Figure:
         below = rows[1].subgridspec(1, len(spectra))
         for place, (channel, pair) in enumerate(spectra.items()):
             _spectrum(figure.add_subplot(below[place]), channel, result.start.units[channel], pair)
-    beside, gaps = grid[0].subgridspec(len(pairs), 1), []
+    columns, gaps = grid[0].subgridspec(len(pairs), 1), []
     for place, (name, pair) in enumerate(pairs.items()):
-        gaps += _law(figure.add_subplot(beside[place]), name, pair, points)
+        gaps += _law(figure.add_subplot(columns[place]), name, pair, points)
     verdict = result.verdict
     colour = _style.GOOD if verdict.better else _style.BAD
     words = f"{verdict.outcome.value}\n{display().words(without_answer(result))}"

@@ -110,8 +110,8 @@ def _beside(result: TuneResult, baseline: AbstractVehicle) -> Table:
     """Ride metrics of the baseline, before and after, on the road of the tuning."""
     assert result.drive is not None
     road, run = result.drive
-    known = (*result.start.layout.metrics, *(result.objective.metrics if result.objective else ()))
-    metrics = list({m.name: m for m in known if m.name in result.units}.values())
+    every_metric = (*result.start.layout.metrics, *(result.objective.metrics if result.objective else ()))
+    metrics = list({m.name: m for m in every_metric if m.name in result.units}.values())
     cars = (baseline, result.start, result.vehicle)
     rides = [Ride(car, road, metrics=metrics, **run)() for car in cars]
     rows = []

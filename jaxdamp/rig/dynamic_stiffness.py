@@ -209,10 +209,10 @@ def _substeps(law: AbstractDamper, frequency: Array, samples: int, wanted: int |
         return int(wanted)
     if not law.initial_state().size:
         return 1
-    known = behind(frequency)
-    if known is None:
+    concrete = behind(frequency)
+    if concrete is None:
         _checks.refuse("substeps", "be given where the frequencies are traced", None, "Pass `substeps=4`.")
-    lowest = float(np.min(known))
+    lowest = float(np.min(concrete))
     count = int(np.ceil(1.0 / (lowest * samples * LONGEST_STEP) * (1.0 - 1e-9)))
     if count * samples > MOST_STEPS:
         remedy = "Pass `substeps`, or begin at a higher frequency."

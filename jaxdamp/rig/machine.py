@@ -124,8 +124,8 @@ class Rig(AbstractDeclared):
         substeps: int = 1,
     ) -> Signal:
         """Force [N] that the load cell would show while the machine moves a damper; the arguments are `readings`'s."""
-        beside = {"temperature": temperature, "command": command}
-        return self.readings(law, time, stroke, velocity, **beside, substeps=substeps).force
+        conditions = {"temperature": temperature, "command": command}
+        return self.readings(law, time, stroke, velocity, **conditions, substeps=substeps).force
 
     def readings(
         self,

@@ -335,9 +335,9 @@ def remember(laws: Sequence[PrintedLaw]) -> None:
     for law in laws:
         key = numbers_of(law._on_rig).key
         with _LOCK:
-            known = _laws.setdefault(key, [])
-            if all(law.free != other.free for other in known):
-                known.append(law)
+            printed = _laws.setdefault(key, [])
+            if all(law.free != other.free for other in printed):
+                printed.append(law)
 
 
 @functools.cache

@@ -153,8 +153,8 @@ def respond(
     _checks.counts(substeps=substeps)
     substeps = operator.index(substeps)
     dt, rate = step_and_rate(time, stroke, None if velocity is None else as_float(velocity))
-    if (known := _checks.concrete(stroke)) is not None:
-        refuse_strokes(law, "stroke", known.min(), known.max())
+    if (concrete := _checks.concrete(stroke)) is not None:
+        refuse_strokes(law, "stroke", concrete.min(), concrete.max())
     if engine is not None:
         _refuse_beside_engine(temperature, command, substeps, state, return_state)
     if temperature is not None:
@@ -170,7 +170,7 @@ def respond(
         force = engine.respond(law, time, stroke, rate)
     else:
         if state is None:  # outside of the long program, which is then that of a given state too
-            begin = state_at_rest(followed.first(law), stroke[0] if known is None else known[0])
+            begin = state_at_rest(followed.first(law), stroke[0] if concrete is None else concrete[0])
         else:
             begin = _checked_state(law, state, followed)
         force, last = march_states(law, dt, stroke, rate, substeps, followed, begin)
@@ -259,8 +259,8 @@ def _commands(law: AbstractDamper, command: Float[ArrayLike, "..."], time: Signa
 def _warn_of_range(law: AbstractDamper, *channels: Signal) -> None:
     """Say by how much known stroke, velocity and force leave the range that the law was fitted to."""
     if has_fitted_range(law):
-        known = [_checks.concrete(channel) for channel in channels]
-        if all(values is not None for values in known):
-            stroke, velocity, force = (np.asarray(values, dtype=float) for values in known)
+        concrete = [_checks.concrete(channel) for channel in channels]
+        if all(values is not None for values in concrete):
+            stroke, velocity, force = (np.asarray(values, dtype=float) for values in concrete)
             motion = Motion(stroke, velocity, force)
             warn_outside([sentence(type(law).__name__, range_use(law, motion))])

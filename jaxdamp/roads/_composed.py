@@ -62,7 +62,9 @@ def _alike(one: Columns, other: Columns) -> bool:
     """Whether columns stand for the same wheels, their axles equally far apart as far as these are known."""
     if one[:2] != other[:2] or one.delays is None or other.delays is None:
         return one[:2] == other[:2]
-    apart = [np.diff(known) for delays in (one.delays, other.delays) if (known := _checks.concrete(delays)) is not None]
+    apart = [
+        np.diff(concrete) for delays in (one.delays, other.delays) if (concrete := _checks.concrete(delays)) is not None
+    ]
     return one.delays.size == other.delays.size and all(np.allclose(a, apart[0], atol=1e-5) for a in apart)
 
 

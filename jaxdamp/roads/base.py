@@ -161,8 +161,8 @@ class AbstractRoad(eqx.Module):
         `None` also of a road that is made of roads for different speeds.
         """
         speeds = [road.speed for road in self._parts if road.speed is not None]
-        known = [value for value in map(_checks.concrete, speeds) if value is not None]
-        if not speeds or any(not np.allclose(value, known[0], rtol=1e-6, atol=0.0) for value in known):
+        numbers = [value for value in map(_checks.concrete, speeds) if value is not None]
+        if not speeds or any(not np.allclose(value, numbers[0], rtol=1e-6, atol=0.0) for value in numbers):
             return None
         return speeds[0]
 

@@ -69,9 +69,9 @@ def from_profile(
             f"of shape {heights.shape}",
             "Give an array of shape [samples] or [samples, wheels].",
         )
-    known = _checks.concrete(heights)
-    _refuse_gaps("height", known)
-    _warn_of_rounding(known)
+    concrete = _checks.concrete(heights)
+    _refuse_gaps("height", concrete)
+    _warn_of_rounding(concrete)
     if speed is not None:
         check_speed(speed, "Roads are driven forwards: reverse the arrays instead.")
     _checks.nonnegative("ramp", ramp, "Use 0 for no fade-in.")

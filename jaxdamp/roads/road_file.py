@@ -109,8 +109,8 @@ def _unit_in(name: str) -> str:
 
 def _size(written: str, units: Mapping[str, float]) -> float | None:
     """A unit in SI, or None if it is none of the same quantity as `units`."""
-    known = next((unit for unit in (written, written.lower()) if unit in units), None)
-    return ratio(written, next(iter(units))) if known is None else units[known]
+    chosen = next((unit for unit in (written, written.lower()) if unit in units), None)
+    return ratio(written, next(iter(units))) if chosen is None else units[chosen]
 
 
 def _table(path: Path) -> tuple[list[str], np.ndarray]:

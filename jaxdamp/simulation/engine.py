@@ -256,10 +256,10 @@ def check_demands(
     control: ControlLoop | None = system.control
     if control is None or commands is None:
         return
-    known, moved = _checks.concrete(commands), _checks.concrete(motion)
-    if known is None or moved is None:
+    concrete, moved = _checks.concrete(commands), _checks.concrete(motion)
+    if concrete is None or moved is None:
         return
-    demands = known[:, len(control.ports) :]
+    demands = concrete[:, len(control.ports) :]
     bad = ~np.isfinite(demands)
     if not bad.any():
         return

@@ -204,10 +204,10 @@ def harmonic_response(
     substeps = _substeps(vehicle, points, int(samples), substeps)
     cycles, change, monodromy = _swept(vehicle, points, sizes, delays, int(samples), substeps)
     channels = jnp.where(is_steady(change)[..., None, None], cycles.channels, jnp.nan)
-    known = _checks.concrete(cycles.motion)
-    if known is not None and not np.any(np.isfinite(known)):
+    concrete = _checks.concrete(cycles.motion)
+    if concrete is not None and not np.any(np.isfinite(concrete)):
         static_equilibrium(vehicle)  # which refuses one that has none
-    if known is not None and has_fitted_range(vehicle):
+    if concrete is not None and has_fitted_range(vehicle):
         flat = [values.reshape(-1, values.shape[-1]) for values in cycles[1:]]
         motion, force, road, rate = flat
         warn_outside(range_sentences(range_uses(vehicle, vehicle.system().form, motion, road, rate, force)))
@@ -223,10 +223,10 @@ def _substeps(vehicle: AbstractVehicle, frequency: Array, samples: int, wanted: 
         if not isinstance(wanted, int | np.integer) or wanted < 1:
             _checks.refuse("substeps", "be a whole number, 1 or more", repr(wanted))
         return int(wanted)
-    known = behind(frequency)
-    lowest = 1.0 if known is None else float(np.min(known))
+    concrete = behind(frequency)
+    lowest = 1.0 if concrete is None else float(np.min(concrete))
     dt = 1.0 / (lowest * samples)
-    cars = None if known is None else known_cars(known_system(vehicle), dt)
+    cars = None if concrete is None else known_cars(known_system(vehicle), dt)
     if cars is None:
         remedy = "Pass as many as `harmonic_response(...).substeps` says outside the compiled function."
         _checks.refuse("substeps", "be given where the numbers of the vehicle are traced", None, remedy)

@@ -130,9 +130,9 @@ class Ride(eqx.Module):
             return
         engine, self.dt = chosen_engine(engine, Exponential(substeps=substeps), dt, substeps)
         _, self.heights = sampled(vehicle, road, duration, self.dt)
-        length, known = (self.heights.shape[0] - 1) * self.dt, _checks.concrete(self.heights)
+        length, concrete = (self.heights.shape[0] - 1) * self.dt, _checks.concrete(self.heights)
         check_control(engine, vehicle.system(), self.dt, length)
-        if road.shortest_event is not None and known is not None and np.all(known == known[0]):
+        if road.shortest_event is not None and concrete is not None and np.all(concrete == concrete[0]):
             text = f"The road stays level for the whole run of {length:g} s: its bump comes later."
             warn(f"{text} Pass a longer `duration`, or an earlier `start` of the bump.")
         self.road = road if delays_by_itself(vehicle, road) else None
@@ -283,8 +283,8 @@ class Ride(eqx.Module):
         ride = self.side_by_side() if is_batched((self, point)) else self
         with self.engine.naming_derivatives():
             values = _drive(ride, point)
-        known = [number for value in values.values() if (number := _checks.concrete(value)) is not None]
-        if isinstance(self.road, WhiteRoad) and not all(np.all(np.isfinite(number)) for number in known):
+        concrete = [number for value in values.values() if (number := _checks.concrete(value)) is not None]
+        if isinstance(self.road, WhiteRoad) and not all(np.all(np.isfinite(number)) for number in concrete):
             refuse_without_stationary_motion(replace(self.vehicle, point), self.road)
         return MetricValues.with_units(values, self.units)
 

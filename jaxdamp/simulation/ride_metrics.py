@@ -118,8 +118,8 @@ def _computed(
 @compiled_for_loops
 def _comfort(weighted: Signal, dt: ScalarLike) -> Comfort:
     length, transient = (weighted.size + 0.01) * dt, jnp.asarray(jnp.nan, weighted.dtype)
-    known = _checks.concrete(length)
-    if known is None or known >= 1.0:  # a second is in it, as far as is known
+    concrete = _checks.concrete(length)
+    if concrete is None or concrete >= 1.0:  # a second is in it, as far as is known
         transient = jnp.where(length < 1.0, transient, metrics.max_transient_value(weighted, dt, None))
     return Comfort(metrics.rms(weighted), transient, metrics.vibration_dose_value(weighted, dt, None))
 
@@ -143,8 +143,8 @@ def first_rows(run: "Response") -> FirstRows:
     """The heights and rates of the road and the commands with which a run began, or the one that it goes on with."""
 
     def first(rows: Float[Array, "time _"]) -> Float[ArrayLike, " _"]:
-        known = _checks.concrete(rows)
-        return rows[0] if known is None else known[0].copy()
+        concrete = _checks.concrete(rows)
+        return rows[0] if concrete is None else concrete[0].copy()
 
     commands = None if run.commands is None else first(run.commands)
     return run.first or (first(run.road), first(run.road_rate), commands)

@@ -45,11 +45,11 @@ class StepModels(NamedTuple):
         highest = self.level[:count] + reach + 0.5 * np.abs(self.curvature[:count]) @ box @ box
         of_planes = (self.planes + np.abs(self.plane_slopes) @ box).reshape(-1, size)[:, :count]
         highest = np.maximum(highest, of_planes.max(axis=0, initial=-np.inf))
-        kept = np.append(~(highest < (self.level[:count] - reach).max()), np.full(size - count, True))
-        planes = np.tile(kept, len(self.planes) // size)
+        chosen = np.append(~(highest < (self.level[:count] - reach).max()), np.full(size - count, True))
+        planes = np.tile(chosen, len(self.planes) // size)
         return StepModels(
-            self.level[kept], self.slopes[kept], self.curvature[kept],
-            self.planes[planes], self.plane_slopes[planes], int(kept[:count].sum()), self.share, self.penalty,
+            self.level[chosen], self.slopes[chosen], self.curvature[chosen],
+            self.planes[planes], self.plane_slopes[planes], int(chosen[:count].sum()), self.share, self.penalty,
         )  # fmt: skip
 
     def reached(self, step: Float[np.ndarray, " free"]) -> tuple[float, float, float]:

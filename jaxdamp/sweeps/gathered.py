@@ -119,9 +119,9 @@ class Kept:
 
     def chosen(self, points: Chosen) -> dict[str, Chosen]:
         """The points that stay, by "smallest", "largest" with a name, and "pareto"."""
-        kept = {f"smallest {name}": points.first(name, count, 1.0) for name, count in self.smallest.items()}
-        kept |= {f"largest {name}": points.first(name, count, -1.0) for name, count in self.largest.items()}
-        return kept | ({"pareto": points.front(self.pareto)} if self.pareto else {})
+        rows = {f"smallest {name}": points.first(name, count, 1.0) for name, count in self.smallest.items()}
+        rows |= {f"largest {name}": points.first(name, count, -1.0) for name, count in self.largest.items()}
+        return rows | ({"pareto": points.front(self.pareto)} if self.pareto else {})
 
     def again(self, key: str, points: Chosen) -> Chosen:
         """Those that stay of the points of two blocks."""
@@ -175,7 +175,9 @@ class Gathered:
     chosen: Mapping[str, Chosen]
 
     @classmethod
-    def of(cls, kept: Kept, names: Sequence[str], indices: np.ndarray, stored: Mapping[str, np.ndarray]) -> "Gathered":
+    def of(
+        cls, summary: Kept, names: Sequence[str], indices: np.ndarray, stored: Mapping[str, np.ndarray]
+    ) -> "Gathered":
         """Of the results of a block."""
         columns = {name: np.asarray(stored[name], np.float64) for name in names}
         reasons, counts = np.unique(np.asarray(stored["reason"], str), return_counts=True)
@@ -185,11 +187,11 @@ class Gathered:
             int(np.count_nonzero(stored["failed"])),
             why,
             {name: Figures.of(column) for name, column in columns.items()},
-            {name: _counted(columns[name], edges) for name, edges in kept.histograms.items()},
-            kept.chosen(Chosen(indices, columns)),
+            {name: _counted(columns[name], edges) for name, edges in summary.histograms.items()},
+            summary.chosen(Chosen(indices, columns)),
         )
 
-    def merged(self, other: "Gathered", kept: Kept) -> "Gathered":
+    def merged(self, other: "Gathered", summary: Kept) -> "Gathered":
         """Of these points and of others."""
         reasons = dict(self.reasons)
         for reason, count in other.reasons.items():
@@ -200,7 +202,7 @@ class Gathered:
             reasons,
             {name: figures + other.figures[name] for name, figures in self.figures.items()},
             {name: counts + other.histograms[name] for name, counts in self.histograms.items()},
-            {key: kept.again(key, some.joined(other.chosen[key])) for key, some in self.chosen.items()},
+            {key: summary.again(key, some.joined(other.chosen[key])) for key, some in self.chosen.items()},
         )
 
     def to_text(self) -> str:

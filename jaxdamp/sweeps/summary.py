@@ -129,10 +129,10 @@ class SweepSummary(AbstractResult):
 
     def tables(self) -> dict[str, Table]:
         """Statistics, and the points that were kept."""
-        kept = {f"smallest {name}": data for name, data in self.smallest.items()}
-        kept |= {f"largest {name}": data for name, data in self.largest.items()}
-        kept |= {} if self.pareto is None else {"pareto": self.pareto}
-        return {"statistics": self.table(), **{name: _listed(name, data) for name, data in kept.items()}}
+        kinds = {f"smallest {name}": data for name, data in self.smallest.items()}
+        kinds |= {f"largest {name}": data for name, data in self.largest.items()}
+        kinds |= {} if self.pareto is None else {"pareto": self.pareto}
+        return {"statistics": self.table(), **{name: _listed(name, data) for name, data in kinds.items()}}
 
     plot = drawn_by("sweep_summary", "Histograms, or mean and range, of each result, and the Pareto set.")
 
@@ -153,9 +153,9 @@ def _listed(name: str, data: Dataset) -> Table:
 class SummaryStore(AbstractStore):
     """What was gathered of each block of a sweep, as a text in a Zarr store."""
 
-    def __init__(self, program: BlockProgram, kept: Kept, path: str) -> None:
-        self.blocks, self._kept, self._names = program.blocks, kept, program.scalars
-        identity = {**program.identity(), "points of a block": str(self.blocks.box), "summary": _said(kept)}
+    def __init__(self, program: BlockProgram, summary: Kept, path: str) -> None:
+        self.blocks, self._kept, self._names = program.blocks, summary, program.scalars
+        identity = {**program.identity(), "points of a block": str(self.blocks.box), "summary": _said(summary)}
         self._texts = BlockStore(path, Blocks((self.blocks.count,), (1,)), identity)
         some = {"failed": Variable({}, np.dtype(bool), {}), "reason": Variable({}, str, {})}
         self._texts.create(("block",), {TEXT: Variable({}, str, {}), **some}, {})
@@ -190,8 +190,8 @@ class SummaryStore(AbstractStore):
 class HeldSummary(AbstractStore):
     """What was gathered of the blocks so far, in memory."""
 
-    def __init__(self, program: BlockProgram, kept: Kept) -> None:
-        self.blocks, self.path, self._kept, self._names = program.blocks, Path(), kept, program.scalars
+    def __init__(self, program: BlockProgram, summary: Kept) -> None:
+        self.blocks, self.path, self._kept, self._names = program.blocks, Path(), summary, program.scalars
         self._total: Gathered | None = None
 
     def left(self) -> np.ndarray:
@@ -222,17 +222,17 @@ def summarise(
 ) -> SweepSummary:
     """Compute all blocks that are not done, and give what was gathered."""
     _checks.instance("summary", summary, Summary, "say what is kept", "Write `summary=sweeps.Summary(...)`.")
-    kept = summary.checked(program.scalars)
-    store = HeldSummary(program, kept) if path is None else SummaryStore(program, kept, path)
+    checked = summary.checked(program.scalars)
+    store = HeldSummary(program, checked) if path is None else SummaryStore(program, checked, path)
     fill(store, program, cluster, progress, "Sweeping")
     gathered = store.gathered()
     if gathered is None:  # all blocks belong to other parts of an array job
         none = dict.fromkeys([*program.scalars, "failed", "reason"], np.zeros(0))
-        gathered = Gathered.of(kept, program.scalars, np.zeros(0, np.int64), none)
-    return _labelled(gathered, kept, program)
+        gathered = Gathered.of(checked, program.scalars, np.zeros(0, np.int64), none)
+    return _labelled(gathered, checked, program)
 
 
-def _labelled(gathered: Gathered, kept: Kept, program: BlockProgram) -> SweepSummary:
+def _labelled(gathered: Gathered, summary: Kept, program: BlockProgram) -> SweepSummary:
     """With names, axes and units."""
     import xarray
 
@@ -240,7 +240,7 @@ def _labelled(gathered: Gathered, kept: Kept, program: BlockProgram) -> SweepSum
     figures = {name: ("statistic", list(f.numbers()), about(name)) for name, f in gathered.figures.items()}
     histograms = {}
     for name, counts in gathered.histograms.items():
-        ends = [-np.inf, *kept.histograms[name], np.inf]
+        ends = [-np.inf, *summary.histograms[name], np.inf]
         coordinates = {"lower": ("bin", ends[:-1], about(name)), "upper": ("bin", ends[1:], about(name))}
         histograms[name] = xarray.DataArray(counts, coordinates, ["bin"], name)
     lists = {key: _points(some, program.points, about) for key, some in gathered.chosen.items()}
@@ -250,9 +250,9 @@ def _labelled(gathered: Gathered, kept: Kept, program: BlockProgram) -> SweepSum
         dict(sorted(gathered.reasons.items(), key=lambda pair: (-pair[1], pair[0]))),
         xarray.Dataset(figures, {"statistic": list(STATISTICS)}),
         histograms,
-        {name: lists[f"smallest {name}"] for name in kept.smallest},
-        {name: lists[f"largest {name}"] for name in kept.largest},
-        lists["pareto"].assign_attrs(objectives=list(kept.pareto)) if kept.pareto else None,
+        {name: lists[f"smallest {name}"] for name in summary.smallest},
+        {name: lists[f"largest {name}"] for name in summary.largest},
+        lists["pareto"].assign_attrs(objectives=list(summary.pareto)) if summary.pareto else None,
     )
 
 
@@ -266,7 +266,7 @@ def _points(some: Chosen, points: AbstractPoints, about: Callable[[str], dict[st
     return data.assign_coords(index=(POINT, some.index))
 
 
-def _said(kept: Kept) -> str:
+def _said(summary: Kept) -> str:
     """What is kept, in a text."""
-    edges = {name: values.tolist() for name, values in kept.histograms.items()}
-    return f"histograms {edges}, smallest {kept.smallest}, largest {kept.largest}, pareto {list(kept.pareto)}"
+    edges = {name: values.tolist() for name, values in summary.histograms.items()}
+    return f"histograms {edges}, smallest {summary.smallest}, largest {summary.largest}, pareto {list(summary.pareto)}"

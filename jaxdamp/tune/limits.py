@@ -99,14 +99,14 @@ def in_scenarios(name: str, scenarios: Sequence[str]) -> list[str]:
 
 
 def limit_spans(
-    limits: Limits | None, known: Sequence[str], start: Mapping[str, float] | None = None
+    limits: Limits | None, metrics: Sequence[str], start: Mapping[str, float] | None = None
 ) -> dict[str, Span]:
     """The smallest and the largest allowed value of metrics by their current names, infinite without one.
 
     Arguments:
         limits: `{metric: largest value}` or `{metric: (smallest, largest)}`, by name or as a `metrics.Metric`; None for
             an end without a limit, `"+10%"` for one relative to the start.
-        known: names of metrics, for those that were renamed.
+        metrics: names of metrics, for those that were renamed.
         start: the metrics of the start, for relative limits.
 
     Raises:
@@ -117,7 +117,7 @@ def limit_spans(
     {'grip': (-inf, 1100.0), 'travel': (0.02, 0.1)}
     """
     spans = {}
-    for name, allowed in limit_ranges(limits, known).items():
+    for name, allowed in limit_ranges(limits, metrics).items():
         if any(allowed.relative) and (start is None or name not in start):
             _checks.refuse(f"limits[{name!r}]", "be a number here, where there is no start", "relative to one", ENDS)
         spans[name] = span_from(name, allowed, math.nan if start is None else float(start.get(name, math.nan)))
@@ -138,12 +138,12 @@ def span_from(name: str, allowed: LimitRange, start: float) -> Span:
     return lower, upper
 
 
-def limit_ranges(limits: Limits | None, known: Sequence[str]) -> dict[str, LimitRange]:
+def limit_ranges(limits: Limits | None, metrics: Sequence[str]) -> dict[str, LimitRange]:
     """The allowed ranges of metrics by their current names, as they are written."""
     if not isinstance(limits, Mapping | None):
         _checks.refuse("limits", "be a mapping of metrics to limits", _checks.described(limits), EXAMPLE)
     return {
-        one.name if isinstance(one, Metric) else current_name(one, known): _range(one, span)
+        one.name if isinstance(one, Metric) else current_name(one, metrics): _range(one, span)
         for one, span in (limits or {}).items()
     }
 

@@ -85,8 +85,8 @@ def objective_of(
     extra = vehicle.chosen_metrics(list(more), "metrics", white=white) if more else []
     given = [one for one in wanted if isinstance(one, Metric)]
     extra += vehicle.chosen_metrics(given, argument) if given else []
-    beside = tuple(exact for exact in map(exact_counterpart, extra) if exact is not None)
-    extra += beside
+    true_peaks = tuple(exact for exact in map(exact_counterpart, extra) if exact is not None)
+    extra += true_peaks
     available = _available(vehicle, extra, white=white)
     names, functions, used = [], {}, []
     for one in wanted:
@@ -102,7 +102,7 @@ def objective_of(
     used += [m.name for m in extra]
     # Further metrics for information: those without weightings, counts and means, which may be negative.
     chosen = [m for m in available.values() if m.name in (*used, *limited) or _for_information(m)]
-    return Objective(tuple(names), tuple(functions.items()), tuple(chosen), beside)
+    return Objective(tuple(names), tuple(functions.items()), tuple(chosen), true_peaks)
 
 
 def _available(vehicle: AbstractVehicle, extra: Sequence[Metric], *, white: bool) -> dict[str, Metric]:
@@ -143,10 +143,10 @@ def goal_objective(
     *,
     white: bool,
     argument: str = "metric",
-    known: Sequence[str] = (),
+    metrics: Sequence[str] = (),
 ) -> str | Metric | Function:
     """An objective with "comfort", "travel" and "grip" spelled out: the metric, or the mean of several."""
-    if not isinstance(one, str) or one in known:
+    if not isinstance(one, str) or one in metrics:
         return one
     names = metrics_of(argument, one, vehicle, white=white)
     return names[0] if len(names) == 1 else _mean_of(one, tuple(names))
@@ -168,7 +168,7 @@ def goal_limits(
     vehicle: AbstractVehicle,
     *,
     white: bool,
-    known: Sequence[str] = (),
+    metrics: Sequence[str] = (),
     argument: str = "limits",
 ) -> Limits | None:
     """Limits with "comfort", "travel" and "grip" spelled out: each metric of a goal gets its limit.
@@ -177,7 +177,7 @@ def goal_limits(
         limits: by metric or goal; anything else is given back.
         vehicle: whose metrics are meant.
         white: for stationary rides on a white road.
-        known: names that are no metrics of the vehicle.
+        metrics: names that are no metrics of the vehicle.
         argument: name of `limits` in messages.
 
     Raises:
@@ -188,7 +188,9 @@ def goal_limits(
     spelled: dict[str | Metric, Ends] = {}
     given: dict[str | Metric, str | Metric] = {}
     for one, span in limits.items():
-        names = metrics_of(argument, one, vehicle, white=white) if isinstance(one, str) and one not in known else [one]
+        names = (
+            metrics_of(argument, one, vehicle, white=white) if isinstance(one, str) and one not in metrics else [one]
+        )
         for name in names:
             if name in given:
                 both = f"{given[name]!r} and {one!r}, which both limit {name}"

@@ -160,9 +160,9 @@ class ScenarioRide(eqx.Module):
             self.refuse_moved_axles("point", lambda values: replace(self.vehicle, values), point)
         white = isinstance(self.roads, WhiteRoad)
         by_name = _on_white_roads(self, vehicle) if white else _in_each(self, vehicle)
-        known = [number for value in by_name.values() if (number := _checks.concrete(value)) is not None]
-        lost = np.flatnonzero(~np.any(np.isfinite(known), axis=0)) if white and known else np.zeros(0, int)
-        if lost.size and np.ndim(known[0]) == 1:
+        concrete = [number for value in by_name.values() if (number := _checks.concrete(value)) is not None]
+        lost = np.flatnonzero(~np.any(np.isfinite(concrete), axis=0)) if white and concrete else np.zeros(0, int)
+        if lost.size and np.ndim(concrete[0]) == 1:
             each = self.roads, self.factors, self.offsets
             road, factors, offsets = jax.tree.map(lambda leaf: leaf[lost[0]], each)
             refuse_without_stationary_motion(_in(vehicle, factors, offsets), road)

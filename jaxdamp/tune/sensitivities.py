@@ -143,7 +143,7 @@ def _objective(
 ) -> Objective:
     """The metrics that are wanted, and no others; of a function all that it may use."""
     further = [one.name for one in more if isinstance(one, Metric)]
-    wanted = [goal_objective(one, vehicle, white=white, known=further) for one in wanted]
+    wanted = [goal_objective(one, vehicle, white=white, metrics=further) for one in wanted]
     objective = objective_of(wanted, vehicle, more, [], white=white)
     if objective.functions:
         return objective

@@ -150,7 +150,7 @@ class DesignTask(Generic[V]):
         metrics, white = settings["metrics"], is_white(road)
         further = [m.name for m in metrics if isinstance(m, Metric)]
         metric_names = [*(m.name for m in vehicle.ride_metrics), *further]
-        spelled = {"white": white, "known": further}
+        spelled = {"white": white, "metrics": further}
         objectives = [goal_objective(one, vehicle, argument=argument, **spelled) for one in objectives]
         limits = goal_limits(settings["limits"], vehicle, **spelled)
         self.allowed = limit_ranges(limits, metric_names)

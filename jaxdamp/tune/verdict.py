@@ -37,8 +37,8 @@ def relative_change(before: float, after: float) -> float | None:
 
 def signed_metrics(result: "TuneResult[AbstractVehicle]") -> set[str]:
     """Names of the metrics that may be negative, of which a change in percent says nothing."""
-    known = (*result.start.layout.metrics, *(result.objective.metrics if result.objective else ()))
-    return {metric.name for metric in known if metric.statistic.signed}
+    metrics = (*result.start.layout.metrics, *(result.objective.metrics if result.objective else ()))
+    return {metric.name for metric in metrics if metric.statistic.signed}
 
 
 def change_in_percent(result: "TuneResult[AbstractVehicle]", name: str, before: float, after: float) -> float | None:

@@ -59,21 +59,21 @@ def chosen_metrics(
         ValueError: an empty list; an unknown name or channel, with the nearest known one; a weighting of a channel that
             is not an acceleration; two metrics of one name.
     """
-    known = {m.name: m for m in layout.metrics}
+    by_name = {m.name: m for m in layout.metrics}
     if wanted is None:
         return list(layout.metrics)
     if isinstance(wanted, Metric):
         _checks.refuse(argument, "be a list", "one Metric", f"Write `{argument}=[metric]`.")
     if not len(wanted):
-        some = ", ".join(map(repr, list(known)[:3]))
+        some = ", ".join(map(repr, list(by_name)[:3]))
         _checks.refuse(argument, "name one or more", "empty", f"Write [{some}], or leave it out for all.")
     if not isinstance(wanted, str):
         spelled = {goal: metrics_of_goal(layout, goal, white=white) for goal in GOALS}
         lists = [(isinstance(one, str) and spelled.get(one)) or [one] for one in wanted]
         wanted = list(itertools.chain.from_iterable(lists))
     names = [m for m in wanted if not isinstance(m, Metric)] if not isinstance(wanted, str) else wanted
-    current = iter(current_names(argument, names, known))
-    chosen = [of_channel(m, layout, argument) if isinstance(m, Metric) else known[next(current)] for m in wanted]
+    current = iter(current_names(argument, names, by_name))
+    chosen = [of_channel(m, layout, argument) if isinstance(m, Metric) else by_name[next(current)] for m in wanted]
     return _of_different_names(chosen, argument)
 
 

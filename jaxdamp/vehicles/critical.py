@@ -90,6 +90,8 @@ def _ends(link: Link, on_road: set[str]) -> tuple[str, str]:
     heights = {name: share for name, share in link.extension.terms.items() if name[:2] == "z_"}
     if on_road.issuperset(heights):  # an anti-roll bar, whose shares may be traced
         return "", ""
-    shares = {name: float(share if (known := behind(share)) is None else known) for name, share in heights.items()}
+    shares = {
+        name: float(share if (concrete := behind(share)) is None else concrete) for name, share in heights.items()
+    }
     above, below = ([name for name, share in shares.items() if share * side > 0.0] for side in (1.0, -1.0))
     return (above[0], below[0]) if len(above) == len(below) == 1 and above[0] not in on_road else ("", "")

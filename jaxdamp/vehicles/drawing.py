@@ -51,8 +51,8 @@ class Drawing:
         self._links = [self._ends(link.extension) for link in frame.links]
         wheels = [self._ends(wheel.point)[0] for wheel in frame.wheels]
         self._on_road = {end.body for end in wheels}
-        known = zip(frame.links, self._links, strict=True)
-        pairs = [(link, ends[0], ends[1]) for link, ends in known if len(ends) == 2]
+        links = zip(frame.links, self._links, strict=True)
+        pairs = [(link, ends[0], ends[1]) for link, ends in links if len(ends) == 2]
         upright = [(link, upper, lower) for link, upper, lower in pairs if self._above(upper, lower)]
         self.springs = [link for link, *_ in upright]
         self.bodies = [body for body in frame.bodies if self._levels[body.name] > 0]
@@ -93,12 +93,12 @@ class Drawing:
         offsets = {self.frame.main_body.name: (0.0, 0.0)}
         for _ in self.frame.bodies:
             for ends in self._links:
-                known = next((end for end in ends if end.body in offsets), None)
-                if known is None:
+                attached = next((end for end in ends if end.body in offsets), None)
+                if attached is None:
                     continue
-                ahead, left = offsets[known.body]
+                ahead, left = offsets[attached.body]
                 for end in ends:
-                    offsets.setdefault(end.body, (ahead + known.ahead - end.ahead, left + known.left - end.left))
+                    offsets.setdefault(end.body, (ahead + attached.ahead - end.ahead, left + attached.left - end.left))
         return {body.name: offsets.get(body.name, (0.0, 0.0)) for body in self.frame.bodies}
 
     @cached_property

@@ -155,9 +155,9 @@ def spectral_rms(
         shared = jnp.asarray(coherence, dtype=float)
         if shared.shape != points.shape:
             _checks.refuse("coherence", f"have the shape {points.shape} of `frequency`", f"of shape {shared.shape}")
-        known = behind(shared)
-        if known is not None and (wrong := ~(np.abs(known) <= 1.0 + 1e-6)).any():
-            _checks.refuse("coherence", "be between -1 and 1", _checks.summary(known, wrong))
+        concrete = behind(shared)
+        if concrete is not None and (wrong := ~(np.abs(concrete) <= 1.0 + 1e-6)).any():
+            _checks.refuse("coherence", "be between -1 and 1", _checks.summary(concrete, wrong))
         offsets = _checks.concrete(linear.left)
         if offsets is not None and (offsets == 0).any():
             remedy = "Take a `RollCar` or a `FullCar`, or leave it out."

@@ -275,8 +275,8 @@ def _triangle(correlation: Float[Array, " pairs"], size: int) -> Float[Array, "s
     for i in range(size):
         row: list[Array] = []
         for j in range(i):
-            known = sum((row[k] * rows[j][k] for k in range(j)), jnp.zeros_like(correlation[0]))
-            row.append((correlation[next(pairs)] - known) / rows[j][j])
+            projected = sum((row[k] * rows[j][k] for k in range(j)), jnp.zeros_like(correlation[0]))
+            row.append((correlation[next(pairs)] - projected) / rows[j][j])
         left = 1.0 - sum((value * value for value in row), jnp.zeros(()))
         rows.append([*row, jnp.sqrt(at_least(left, _NARROWEST))])
     none = jnp.zeros(())

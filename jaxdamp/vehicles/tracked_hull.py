@@ -130,7 +130,7 @@ class TrackedHull(AbstractVehicle):
         μ = √2 ln d/Σ_d l² · √(J C Σ l²/(4π² + ln² d)); the paper's 1.41 is √2, and its sums run over the damped wheels
         in front of the root and over all under it.
         """
-        if (known := _checks.concrete(decrement)) is not None and not np.all(known > 1.0):
+        if (concrete := _checks.concrete(decrement)) is not None and not np.all(concrete > 1.0):
             _checks.refuse("decrement", "be above 1", decrement, "It is an amplitude divided by that a cycle later.")
         every, front, rear = self._squares()
         logarithm = jnp.log(jnp.asarray(decrement, dtype=every.dtype))
@@ -173,11 +173,11 @@ class TrackedHull(AbstractVehicle):
 
         def half(ahead: ScalarLike, behind: ScalarLike) -> Scalar:
             n = (ahead * front + behind * rear) / self.pitch_inertia
-            known = _checks.concrete(n / frequency)
-            if known is not None and not np.all(known < 1.0):
+            concrete = _checks.concrete(n / frequency)
+            if concrete is not None and not np.all(concrete < 1.0):
                 remedy = "Pitch does not oscillate: simulate it, or take smaller ones."
                 _checks.refuse(
-                    "compression, rebound", "be below critical damping", f"{np.max(known):.3g} times it", remedy
+                    "compression, rebound", "be below critical damping", f"{np.max(concrete):.3g} times it", remedy
                 )
             return jnp.exp(jnp.pi * n / jnp.sqrt(frequency**2 - n**2))
 

@@ -171,8 +171,8 @@ class LimitCheck(AbstractResult):
     @property
     def summary(self) -> str:
         """How many limits are kept."""
-        kept = sum(m is not None and limit.kept_by(m.value) for limit, m in self.results)
-        return f"{kept} of {len(self.results)} limits are kept."
+        passed = sum(m is not None and limit.kept_by(m.value) for limit, m in self.results)
+        return f"{passed} of {len(self.results)} limits are kept."
 
     plot = drawn_by("limit_check", "Each measured value between its limits.")
 
@@ -277,8 +277,8 @@ def _size(written: str, column: str, quantity: str) -> float:
         _checks.one_of("quantity", quantity, UNITS)
     unit = "m/s" if column == "velocity" else UNITS[quantity]
     role = {"N": "force", "m/s": "velocity"}.get(unit)
-    known = conversion(role, written) if role else None
-    size = known.factor if known else ratio(written, unit)
+    factor = conversion(role, written) if role else None
+    size = factor.factor if factor else ratio(written, unit)
     if size is None:
         of = "a velocity" if column == "velocity" else repr(quantity)
         must = f"have a unit of {of} in the header, such as {unit!r}" if unit else f"have no unit for {of}"
