@@ -66,8 +66,8 @@ def value_and_jacobian(
         smooth = {name: results[name] for name in chosen}
         return smooth, {name: value for name, value in results.items() if name not in smooth}
 
-    smooth, rest, slopes = _forward(split, point) if mode == "forward" else _reverse(split, point)
-    return smooth | rest, slopes
+    smooth, others, slopes = _forward(split, point) if mode == "forward" else _reverse(split, point)
+    return smooth | others, slopes
 
 
 Split = Callable[[dict[str, Array]], tuple[Results, Results]]
@@ -79,31 +79,31 @@ def _forward(split: Split, point: dict[str, Array]) -> tuple[Results, Results, d
     tangents = {name: zeros[name].at[i].set(1.0) for i, name in enumerate(names)}
 
     def push(tangent: dict[str, Array]) -> tuple[Results, Results, Results]:
-        smooth, along, rest = jax.jvp(split, (point,), (tangent,), has_aux=True)
-        return smooth, along, rest
+        smooth, along, others = jax.jvp(split, (point,), (tangent,), has_aux=True)
+        return smooth, along, others
 
-    smooth, along, rest = jax.vmap(push, out_axes=(None, 0, None))(tangents)
+    smooth, along, others = jax.vmap(push, out_axes=(None, 0, None))(tangents)
     slopes = {result: {name: rows[i] for i, name in enumerate(names)} for result, rows in along.items()}
-    return smooth, rest, slopes
+    return smooth, others, slopes
 
 
 def _reverse(split: Split, point: dict[str, Array]) -> tuple[Results, Results, dict[str, Results]]:
-    smooth, pull, rest = jax.vjp(split, point, has_aux=True)
+    smooth, pull, others = jax.vjp(split, point, has_aux=True)
     lanes = next(iter(point.values())).shape
-    own = {name: value.shape[len(lanes) :] for name, value in smooth.items()}  # shape of a result at one point
+    shapes = {name: value.shape[len(lanes) :] for name, value in smooth.items()}  # shape of a result at one point
     starts, total = {}, 0
-    for name, shape in own.items():
+    for name, shape in shapes.items():
         starts[name] = total
         total += math.prod(shape)
     seeds = {}
     for name, value in smooth.items():
-        rows = jnp.eye(total, math.prod(own[name]), -starts[name], dtype=value.dtype)
-        seeds[name] = jnp.broadcast_to(rows.reshape(total, *(1,) * len(lanes), *own[name]), (total, *value.shape))
+        rows = jnp.eye(total, math.prod(shapes[name]), -starts[name], dtype=value.dtype)
+        seeds[name] = jnp.broadcast_to(rows.reshape(total, *(1,) * len(lanes), *shapes[name]), (total, *value.shape))
     (pulled,) = jax.vmap(pull)(seeds)
 
     def of_result(rows: Array, name: str) -> Array:
-        rows = rows[starts[name] : starts[name] + math.prod(own[name])]
-        return jnp.moveaxis(rows, 0, -1).reshape(*lanes, *own[name])
+        rows = rows[starts[name] : starts[name] + math.prod(shapes[name])]
+        return jnp.moveaxis(rows, 0, -1).reshape(*lanes, *shapes[name])
 
     slopes = {name: {entry: of_result(rows, name) for entry, rows in pulled.items()} for name in smooth}
-    return smooth, rest, slopes
+    return smooth, others, slopes

@@ -75,12 +75,12 @@ def _judge_together(module: PyTree, start: str, below: Columns, reasons: np.ndar
     Conditions of a module stand in a `__check_init__` of its class and never pass what is not a number. One that takes
     NaN everywhere does not look at these values, and is not asked again.
     """
-    own = type(module).__dict__.get("__check_init__")
+    check = type(module).__dict__.get("__check_init__")
     varying = _domains_by_value(module)
     place = _Placed(module, list(below))
-    if own is not None and not _refusal(own, place.at(np.full(len(below), np.nan))):
-        own = None
-    if own is None and not varying:
+    if check is not None and not _refusal(check, place.at(np.full(len(below), np.nan))):
+        check = None
+    if check is None and not varying:
         return
     left = np.flatnonzero(reasons == "")
     rows, places = np.unique(np.stack([c[left] for c in below.values()], axis=1), axis=0, return_inverse=True)
@@ -91,8 +91,8 @@ def _judge_together(module: PyTree, start: str, below: Columns, reasons: np.ndar
         wrong = [name for name, domain in domains.items() if not domain.contains(np.asarray(get(changed, name)))]
         if wrong:
             verdicts[i] = f"{start}{wrong[0]} must be {domains[wrong[0]].name}"
-        elif own is not None:
-            verdicts[i] = _refusal(own, changed)
+        elif check is not None:
+            verdicts[i] = _refusal(check, changed)
     reasons[left] = verdicts[places.ravel()]
 
 

@@ -88,8 +88,8 @@ def increasing_root(
 
         def again(now: PyTree) -> PyTree:
             count, _, before = now
-            after, rest = differentiable_step(constants, before)
-            return count + 1, moved(before[0], after), (after, *rest)
+            after, residual = differentiable_step(constants, before)
+            return count + 1, moved(before[0], after), (after, *residual)
 
         start = jnp.ones_like(w, bool)
         for _ in range(likely if target().fused_loops else 0):  # written out they are fast, but take longer to compile

@@ -30,13 +30,13 @@ def with_defaults(
 
     def decorated(function: Function) -> Function:
         signature = inspect.signature(function)
-        *own, settings = signature.parameters.values()
+        *first, settings = signature.parameters.values()
         kinds = {
             n: getattr(k, "__forward_arg__", k) for n, k in get_args(settings.annotation)[0].__annotations__.items()
         }
         keyword = functools.partial(inspect.Parameter, kind=inspect.Parameter.KEYWORD_ONLY)
         described = [keyword(name, default=value, annotation=kinds[name]) for name, value in filled.items()]
-        names = {p.name: p for p in (*own, *described)}
+        names = {p.name: p for p in (*first, *described)}
 
         @functools.wraps(function)
         def call(*args: object, **given: object) -> object:

@@ -232,13 +232,13 @@ _BAND = ("from", "to")  # of a force; times and distances have no direction
 
 def _factor(present: Display, column: Column, unit: str, quantity: str) -> float:
     """What a number is shown times, of a row with this unit and quantity, if it states them."""
-    own = column.unit or ("" if column.name in _COUNTS else unit)
-    if own in ("", "–", "%"):
+    unit_of_column = column.unit or ("" if column.name in _COUNTS else unit)
+    if unit_of_column in ("", "–", "%"):
         return 1.0
     signed = present.signed(column.name if column.unit else quantity) and column.name not in _SPREADS
     signed |= column.unit == "N" and column.name in _BAND
     signed &= not (quantity and column.name == "velocity")  # it is positive, the direction is in the quantity
-    return present.of(own.replace("²", "^2"), signed=signed).factor
+    return present.of(unit_of_column.replace("²", "^2"), signed=signed).factor
 
 
 def _unit_shown(present: Display, unit: str) -> str:

@@ -93,13 +93,13 @@ def known(tree: Tree) -> Tree | None:
     """The tree with the values behind its arrays; None where one of them is a batch or not known yet."""
     if not is_traced(tree):
         return tree
-    arrays, rest = eqx.partition(tree, eqx.is_array)
+    arrays, static = eqx.partition(tree, eqx.is_array)
     batches = [look_behind(leaf) for leaf in jax.tree.leaves(arrays)]
     if any(leaf is None or leaf.batch_axes for leaf in batches):
         return None
     with at_compile_time():
         values = [jnp.asarray(leaf.value) for leaf in batches if leaf is not None]
-    return eqx.combine(jax.tree.unflatten(jax.tree.structure(arrays), values), rest)
+    return eqx.combine(jax.tree.unflatten(jax.tree.structure(arrays), values), static)
 
 
 def rows(tree: PyTree) -> list[np.ndarray] | None:
@@ -123,9 +123,9 @@ def rows(tree: PyTree) -> list[np.ndarray] | None:
 
 def row(tree: Tree, values: list[np.ndarray], index: int) -> Tree:
     """The tree of one car of `rows`, with arrays of NumPy."""
-    arrays, rest = eqx.partition(tree, eqx.is_array)
+    arrays, static = eqx.partition(tree, eqx.is_array)
     chosen = [np.asarray(value[index]) for value in values]
-    return eqx.combine(jax.tree.unflatten(jax.tree.structure(arrays), chosen), rest)
+    return eqx.combine(jax.tree.unflatten(jax.tree.structure(arrays), chosen), static)
 
 
 def of_known_numbers(function: Function) -> Function:

@@ -151,9 +151,11 @@ def read_dampers(paths: str | os.PathLike[str], *, each: str, **options: object)
         raise FileNotFoundError(f"{top} holds no *.csv or other file of records.")
     common = (top if top.is_dir() else top.parent) / NAME
     given, said = options.get("manifest", True), _said(options)
-    own = find_manifest(given, [top]) if isinstance(given, str | os.PathLike) else None
-    own = None if own is None else own.absolute()  # also read where the working directory is another one
-    manifests = [own or (_manifest(some[0].parent, common) if given else None) for some in files.values()]
+    manifest_here = find_manifest(given, [top]) if isinstance(given, str | os.PathLike) else None
+    manifest_here = (
+        None if manifest_here is None else manifest_here.absolute()
+    )  # also read where the working directory is another one
+    manifests = [manifest_here or (_manifest(some[0].parent, common) if given else None) for some in files.values()]
     keys = list(zip(files.values(), manifests, strict=True))
     stamps = [f"{_stamp(some if at is None else [*some, at])} {said}".strip() for some, at in keys]
     return DamperRecords(functools.partial(_read_damper, options), keys, files, stamps)

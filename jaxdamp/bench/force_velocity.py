@@ -74,8 +74,10 @@ class ForceVelocityTable:
                 there = ", ".join(map(repr, self.settings))
                 _checks.refuse("setting", "be named", "left out", f"The settings have no numbers: {there}.")
             grid = np.unique(np.concatenate([curve.velocity for curve in self.curves]))
-            own = [TableLaw(curve.velocity, curve.force) for curve in self.curves]  # with end slopes beyond its points
-            laws = tuple(kind(grid, [float(each.force_velocity(v)) for v in grid]) for each in own)
+            tables = [
+                TableLaw(curve.velocity, curve.force) for curve in self.curves
+            ]  # with end slopes beyond its points
+            laws = tuple(kind(grid, [float(each.force_velocity(v)) for v in grid]) for each in tables)
             levels = [float(curve.command or 0.0) for curve in self.curves]
             law = Scheduled(laws, levels, levels[0])
             return with_fitted_range(law, replace(_range(self.curves), command=(levels[0], levels[-1])))

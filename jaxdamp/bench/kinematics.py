@@ -152,7 +152,7 @@ def _role(table: RawTable, index: int) -> str | None:
     """What a column is by the words of its header, unless its unit says that it is no such thing."""
     name, written = split_header(table.columns[index].name)
     unit, words = table.columns[index].unit or written or "", _words(name)
-    role = next((role for role, own in _WORDS.items() if words & own), None)
+    role = next((role for role, names in _WORDS.items() if words & names), None)
     return None if role != "ratio" and unit and conversion("stroke", unit) is None else role
 
 

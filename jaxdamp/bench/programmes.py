@@ -88,12 +88,12 @@ class Ramped:
         return self.run_up > 0
 
     def _check_ends(self) -> None:
-        for rest, ramp in (("rest_before", "run_up"), ("rest_after", "run_down")):
-            _checks.nonnegative(rest, getattr(self, rest))
+        for pause, ramp in (("rest_before", "run_up"), ("rest_after", "run_down")):
+            _checks.nonnegative(pause, getattr(self, pause))
             _checks.nonnegative(ramp, getattr(self, ramp))
-            if getattr(self, rest) > 0 and not getattr(self, ramp) > 0:
+            if getattr(self, pause) > 0 and not getattr(self, ramp) > 0:
                 remedy = "Between rest and motion the amplitude needs time: the velocity must not jump."
-                _checks.refuse(ramp, f"be positive beside a `{rest}`", getattr(self, ramp), remedy)
+                _checks.refuse(ramp, f"be positive beside a `{pause}`", getattr(self, ramp), remedy)
 
     def _envelope(self, time: Samples) -> tuple[Samples, Samples]:
         """Share of the steady amplitude at instants [s], and its rate [1/s]."""

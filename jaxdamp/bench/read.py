@@ -199,9 +199,9 @@ def _names(files: Sequence[Path]) -> list[str]:
 
 def _apart(folder: Path, folders: set[Path]) -> tuple[str, ...]:
     """As many of the last parts of a folder as tell it from the others."""
-    own, others = folder.parts[::-1], [other.parts[::-1] for other in folders - {folder}]
-    count = next(k for k in range(len(own) + 1) if all(other[:k] != own[:k] for other in others))
-    return own[:count][::-1]
+    parts, others = folder.parts[::-1], [other.parts[::-1] for other in folders - {folder}]
+    count = next(k for k in range(len(parts) + 1) if all(other[:k] != parts[:k] for other in others))
+    return parts[:count][::-1]
 
 
 def _named(tables: Sequence[RawTable], name: str) -> list[tuple[RawTable, str]]:

@@ -86,10 +86,10 @@ def _with_channels(table: RawTable, other: RawTable, choice: Choice) -> RawTable
     if not channels or clock is None or slow is None or not _covers(slow.instants, clock.instants):
         return None
     names = " and ".join(repr(column.name) for column in channels)
-    rest = [column.name for column in other.columns if column not in (*channels, other.columns[slow.column])]
+    left_out = [column.name for column in other.columns if column not in (*channels, other.columns[slow.column])]
     rate = 1.0 / np.median(np.diff(slow.instants))
     note = f"{names} brought from a clock of {rate:.4g} Hz onto that of the record by straight lines"
-    note += f"; not used of that clock: {', '.join(rest)}" * bool(rest)
+    note += f"; not used of that clock: {', '.join(left_out)}" * bool(left_out)
     brought = _straight(slow.instants, clock.instants, channels)
     return replace(table, columns=(*table.columns, *brought), notes=(*table.notes, note))
 

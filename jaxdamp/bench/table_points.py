@@ -213,8 +213,8 @@ def _apart(halves: list[tuple[int, Side]]) -> list[tuple[int, Side]]:
     if any(len(same) > 1 for same in files.values()):
         names = {file: re.split(r"[_\s]+", file.stem) for same in files.values() for file in same}
         common = set.intersection(*map(set, names.values()))
-        own = {file: [word for word in words if word not in common] for file, words in names.items()}
-        names = own if all(own.values()) else names
+        distinct = {file: [word for word in words if word not in common] for file, words in names.items()}
+        names = distinct if all(distinct.values()) else names
         halves = [(way, side._replace(setting=_in_file(names[side.file], side))) for way, side in halves]
     seen: dict[tuple[int, str], str] = {}
     for direction, side in halves:
@@ -252,12 +252,12 @@ def _rest(points: Directions, notes: list[str]) -> None:
             notes.append("no force at rest, since forces are given as magnitudes by direction")
 
 
-def _share(own: dict[str, list[np.ndarray]], others: Iterable[str], word: str, notes: list[str]) -> None:
+def _share(measured: dict[str, list[np.ndarray]], others: Iterable[str], word: str, notes: list[str]) -> None:
     """Take a direction that has no settings for all those of the other."""
-    if len(own) == 1 and set(own) != set(others):
-        (only,) = own.values()
-        own.clear()
-        own.update(dict.fromkeys(others, only))
+    if len(measured) == 1 and set(measured) != set(others):
+        (only,) = measured.values()
+        measured.clear()
+        measured.update(dict.fromkeys(others, only))
         notes.append(f"{word} is the same at all settings")
 
 

@@ -84,7 +84,7 @@ class Commands(TyperGroup):
 
     def resolve_command(self, ctx: "Context", args: list[str]) -> tuple[str | None, "AnyCommand | None", list[str]]:
         """The command of the first word."""
-        name, chosen, rest = super().resolve_command(ctx, args)
+        name, chosen, remaining = super().resolve_command(ctx, args)
         if chosen is not None:
             from jaxdamp.cli import options
 
@@ -94,7 +94,7 @@ class Commands(TyperGroup):
             for leaf in options.offered(COMMANDS[str(name)]):
                 _words.setdefault(leaf.argument.name, _words[leaf.option])
         ctx.call_on_close(_words.clear)
-        return name, chosen, rest
+        return name, chosen, remaining
 
 
 def command_line() -> str:

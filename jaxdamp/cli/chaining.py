@@ -303,8 +303,8 @@ def truth_verdict(scenario: Scenario, result: FitResult | None) -> str:
     off = [abs(cell) for cell in (row["(value − true)/se"] for row in determined) if isinstance(cell, float)]
     if not off:
         return "None of the parameters is determined by these records."
-    rest = len(rows) - len(determined)
-    blind = f" {rest} more cannot be told from these records, and the fit says so." if rest else ""
+    undetermined = len(rows) - len(determined)
+    blind = f" {undetermined} more cannot be told from these records, and the fit says so." if undetermined else ""
     return f"{len(off)} parameters are determined; they are at most {max(off):.1f} standard errors off.{blind}"
 
 

@@ -81,10 +81,10 @@ def parse_policy(word: str, car: AbstractVehicle) -> Policy:
         kinds = (control.AbstractPolicy, control.AbstractVehiclePolicy)
         return read_module("controller", Path(word), kinds, "a policy", "`jaxdamp tune --controller` writes it.")
     policies = POLICIES | {"lqr": functools.partial(control.lqr, car)}
-    name, _, rest = word.partition(":")
+    name, _, numbers_text = word.partition(":")
     _checks.one_of("controller", name, policies)
     try:
-        pairs = [part.split("=") for part in rest.split(",") if part]
+        pairs = [part.split("=") for part in numbers_text.split(",") if part]
         numbers = {key.strip(): float(value) for key, value in pairs}
     except ValueError:
         _checks.refuse("controller", "read like skyhook:gain=3000,lead=0.01", repr(word))

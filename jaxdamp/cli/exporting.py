@@ -50,9 +50,9 @@ class OneFile:
         be replaced.
         """
         file = Path(name) if self.file is None else self.file
-        whole, own = file / name if file.is_dir() else file, Path(name).suffix
-        if whole.suffix.lower() != own:
-            _checks.refuse("file", f"be a folder or a file NAME{own}", whole, f"Try {whole.stem}{own}.")
+        whole, suffix = file / name if file.is_dir() else file, Path(name).suffix
+        if whole.suffix.lower() != suffix:
+            _checks.refuse("file", f"be a folder or a file NAME{suffix}", whole, f"Try {whole.stem}{suffix}.")
         for each in (whole, *(whole.with_name(f"{whole.stem}{ending}") for ending in others)):
             if each.exists() and not self.replace:
                 _checks.refuse("file", "be a new file", each, "Give another name, or --replace.")

@@ -84,10 +84,10 @@ def leaves(target: str) -> tuple[Leaf, ...]:
 
     What a called function must have is the business of the command; so are arguments of the names of its own.
     """
-    own = [leaf for leaf in _leaves(target) if leaf.argument.name != "screen"]
-    names = {leaf.option for leaf in own if not leaf.argument.callee}
+    direct = [leaf for leaf in _leaves(target) if leaf.argument.name != "screen"]
+    names = {leaf.option for leaf in direct if not leaf.argument.callee}
     options = []
-    for leaf in own:
+    for leaf in direct:
         callee = leaf.argument.callee
         called = [inner for inner in _leaves(callee) if inner.argument.default is not REQUIRED] if callee else []
         placed = [inner._replace(path=(*leaf.path, *inner.path)) for inner in called if inner.option not in names]

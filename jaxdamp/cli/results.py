@@ -66,7 +66,7 @@ class Results:
             fresh = written(self.draft)
             for name in fresh:
                 sync(self.draft / name)
-            own = set(self._published)
+            published = set(self._published)
             self._made.update(fresh)
             self._published |= {name: resuming.sha256(self.draft / name) for name in fresh}
             if not self.target.exists():
@@ -76,21 +76,21 @@ class Results:
                 self.draft.chmod(0o777 & ~mask)
                 self.draft.rename(self.target)
             else:
-                self._move(fresh, own, missing)
+                self._move(fresh, published, missing)
             sync(self.target.parent)
             self._begun = True
             shutil.rmtree(self.draft, ignore_errors=True)
             if missing:
                 self.draft = self._new_draft()
 
-    def _move(self, fresh: list[str], own: set[str], missing: str) -> None:
+    def _move(self, fresh: list[str], published: set[str], missing: str) -> None:
         """Move the draft into a folder that exists; the files of this run there are replaced, others and links kept."""
         if not self._begun:
             self._keep_previous(fresh)
         moved = f'what was being moved here when the run ended; nothing if {MANIFEST} has "complete": true'
         self._tell(self.target, missing or moved)
         for name in fresh:
-            os.replace(self.draft / name, own_place(self.target, name, self._keep, replace=name in own))
+            os.replace(self.draft / name, own_place(self.target, name, self._keep, replace=name in published))
         if not missing:
             self._drop_outdated()
         self._tell(self.target, missing)

@@ -59,18 +59,18 @@ class Driving:
     def over(self, word: str, count: int = 1) -> tuple[list[AbstractRoad] | list[WhiteRoad], Run]:
         """So many realisations of the road that a word means, and the options of a run over them."""
         _checks.positive("speed", self.speed)
-        kind, _, rest = word.partition(":")
+        kind, _, value = word.partition(":")
         if kind == "white":
             if self.duration is not None:
                 _checks.refuse("duration", "be left out on a white road", self.duration)
-            return [roads.white(rest, self.speed)] * count, Run()
+            return [roads.white(value, self.speed)] * count, Run()
         if self.duration is not None:
             _checks.positive("duration", self.duration)
         length = USUAL if self.duration is None else self.duration
         seeds = range(self.seed, self.seed + count)
         realisations = [parse_road(word, speed=self.speed, duration=length, seed=seed) for seed in seeds]
-        own = length if self.duration is not None or kind == "iso" else realisations[0].duration or length
-        return realisations, Run(duration=own, dt=self.dt)
+        duration = length if self.duration is not None or kind == "iso" else realisations[0].duration or length
+        return realisations, Run(duration=duration, dt=self.dt)
 
 
 def parse_road(word: str, *, speed: float, duration: float, seed: int) -> AbstractRoad:
@@ -79,12 +79,12 @@ def parse_road(word: str, *, speed: float, duration: float, seed: int) -> Abstra
     "iso:C" is an ISO 8608 class, "bump:0.06:5" a cosine bump of height and length in metres that begins after a second,
     anything else a file: OpenCRG (*.crg), or text with positions and heights, in m or in the units of its header.
     """
-    kind, _, rest = word.partition(":")
+    kind, _, value = word.partition(":")
     if kind == "iso":
-        return roads.iso8608(rest, speed, duration, seed=seed)
+        return roads.iso8608(value, speed, duration, seed=seed)
     if kind == "bump":
         try:
-            height, length = map(float, rest.split(":"))
+            height, length = map(float, value.split(":"))
         except ValueError:
             _checks.refuse("road", "read like bump:HEIGHT:LENGTH with numbers in metres", repr(word))
         return roads.cosine_bump(height, start=1.0, length=length, speed=speed)

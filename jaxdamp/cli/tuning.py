@@ -45,8 +45,8 @@ def sweep_part(screen: Screen, ride: Ride, axes: Mapping[str, np.ndarray], how: 
     done, count = data.attrs["points_done"], data["failed"].size
     blocks, (number, _) = stored_blocks(store), part_of("block", part)
     idle = f"part {part} has no block: the sweep has {blocks}." if number > blocks else f"part {part} is done."
-    rest = "The same command without --block writes the results." if done == count else ""
-    screen.answer(idle, f"{done} of {count} points are in {store}.", rest)
+    remedy = "The same command without --block writes the results." if done == count else ""
+    screen.answer(idle, f"{done} of {count} points are in {store}.", remedy)
 
 
 def swept(

@@ -124,13 +124,13 @@ def fit_arguments(
     more: Arguments = {}
     guides = [guide_words(body, numbers, car) for body, numbers in guide]
     if guides:
-        own = [f"guides.{i}.{name}" for i, (_, free) in enumerate(guides) for name in free]
+        of_guides = [f"guides.{i}.{name}" for i, (_, free) in enumerate(guides) for name in free]
         friction = ["law.friction_force", "law.friction_velocity"]
         numbers = [["stiffness", "damping", *friction * (guide.law is not None)] for guide, _ in guides]
         held = [f"guides.{i}.{name}" for i, names in enumerate(numbers) for name in names]
         car = Guided(car, tuple(guide for guide, _ in guides))
-        more["over"] = None if "over" not in given else [*given["over"], *own]
-        more["freeze"] = [*given.get("freeze", ()), *[path for path in held if path not in own]]
+        more["over"] = None if "over" not in given else [*given["over"], *of_guides]
+        more["freeze"] = [*given.get("freeze", ()), *[path for path in held if path not in of_guides]]
         paths = {f"car.{path}": runs for path, runs in benches.items()}
     more["sensors"] = sensor_words(given.get("sensors", ()), rides)
     machine = identify.machine_names("rig", given.get("rig", ())) or None

@@ -240,12 +240,12 @@ def named_numbers(defaults: Mapping[str, float | None], example: str) -> Callabl
         return [one(option, text) for text in given]
 
     def one(option: str, text: str) -> Named:
-        owner, _, rest = (part.strip() for part in text.partition(":"))
-        if not owner or not rest:
+        owner, _, stated = (part.strip() for part in text.partition(":"))
+        if not owner or not stated:
             must = "read like NAME:NUMBER=START,NUMBER=START"
             _checks.refuse(option, must, repr(text), f"Such as {example}.")
         numbers: dict[str, float] = {}
-        for part in rest.split(","):
+        for part in stated.split(","):
             name, equals, value = (piece.strip() for piece in part.partition("="))
             _checks.one_of(option, name, defaults)
             try:

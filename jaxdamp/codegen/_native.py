@@ -85,18 +85,18 @@ def library(text: str, build: Build = FIT) -> ctypes.CDLL:
 
 def _loaded(folder: Path, text: str, command: list[str], build: Build) -> ctypes.CDLL:
     """From a folder where it may be already."""
-    own = hashlib.sha256("\n".join([text, *command, str(build), _processor()]).encode()).hexdigest()[:24]
-    for path in folder.glob(f"c_{own}_*.so"):
+    digest = hashlib.sha256("\n".join([text, *command, str(build), _processor()]).encode()).hexdigest()[:24]
+    for path in folder.glob(f"c_{digest}_*.so"):
         if path.stem.endswith(hashlib.sha256(path.read_bytes()).hexdigest()[:24]):
             return ctypes.CDLL(str(path))
-    draft = folder / f"{own}-{uuid.uuid4().hex}"
+    draft = folder / f"{digest}-{uuid.uuid4().hex}"
     source, target = draft.with_suffix(".c"), draft.with_suffix(".tmp")
     source.write_text(text, encoding="utf-8")
     said = _compiled([*command, str(source), "-o", str(target)], build)
     source.unlink()
     if said is not None:
         raise NotImplementedError(f"{command[0]} does not compile the printed functions: {said}")
-    path = folder / f"c_{own}_{hashlib.sha256(target.read_bytes()).hexdigest()[:24]}.so"
+    path = folder / f"c_{digest}_{hashlib.sha256(target.read_bytes()).hexdigest()[:24]}.so"
     target.replace(path)
     return ctypes.CDLL(str(path))
 
@@ -151,10 +151,10 @@ def registered(text: str, *functions: tuple[str, str]) -> str:
 
     Functions are given with their platform of XLA, "cpu" or "CUDA"; without any it is `loop` on "cpu".
     """
-    own, loops = f"jaxdamp_loop_{hashlib.sha256(text.encode()).hexdigest()[:20]}", library(text, LOOP)
+    name, loops = f"jaxdamp_loop_{hashlib.sha256(text.encode()).hexdigest()[:20]}", library(text, LOOP)
     for where, function in functions or (("cpu", "loop"),):
-        jax.ffi.register_ffi_target(own, jax.ffi.pycapsule(getattr(loops, function)), platform=where)
-    return own
+        jax.ffi.register_ffi_target(name, jax.ffi.pycapsule(getattr(loops, function)), platform=where)
+    return name
 
 
 INSTALL = "Install `nvidia-cuda-nvrtc-cu12`, or `nvidia-cuda-nvrtc` for CUDA 13."

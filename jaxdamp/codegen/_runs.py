@@ -190,12 +190,12 @@ class _Divided:
         """A loop, and the run before it, which knows where it is entered."""
         going = Variable(f"going{next(self._count)}", "bool")
         place = next(i for i, s in enumerate(loop.body) if isinstance(s, Leave))
-        condition, leave, rest = loop.body[:place], loop.body[place], loop.body[place + 1 :]
+        condition, leave, after = loop.body[:place], loop.body[place], loop.body[place + 1 :]
         starts = {s.target: s.start for s in run if isinstance(s, Declare)}
         test, goes = _tested(condition, leave, starts, "_first")
         run = [*run, *test, Define(going, "and", (goes, outside or constant(True, "bool")))]
         # the rest may read what the condition has computed
-        *parts, last = self._divided([*pruned(condition, names_in(rest)), *rest], going)
+        *parts, last = self._divided([*pruned(condition, names_in(after)), *after], going)
         assert isinstance(last, _Run)
         test, goes = _tested(
             condition, leave, {s.target: s.after for s in last.statements if isinstance(s, _Next)}, "_again"
@@ -293,7 +293,7 @@ def _runs(body: _Body) -> Iterator[_Run]:
 
 def _in_turn(lines: Sequence[str], vectors: str) -> Iterator[str]:
     """Each line for one vector after the other, with names of its own for what it defines."""
-    own = {"lane", *(name for line in lines for name in re.findall(r"^ *const \w+ (\w+)", line))}
+    local = {"lane", *(name for line in lines for name in re.findall(r"^ *const \w+ (\w+)", line))}
     for line in lines:
         for vector in vectors:
-            yield re.sub(r"[A-Za-z]\w*", lambda word, v=vector: word[0] + v * (word[0] in own), line)
+            yield re.sub(r"[A-Za-z]\w*", lambda word, v=vector: word[0] + v * (word[0] in local), line)

@@ -264,8 +264,8 @@ def rows_of(frame: Frame, ports: Float[Array, "dampers q"]) -> tuple[Array, ...]
         above = ports[:, place : place + 1] > 0.0
 
         def of(coordinates: Collection[str], above: Array = above) -> Array:
-            own = np.array([name in coordinates for name in names])
-            return jnp.where(own[None, :] & above, ports, 0.0)
+            available = np.array([name in coordinates for name in names])
+            return jnp.where(available[None, :] & above, ports, 0.0)
 
         turns = {turn.axis: {part.angle(turn.axis)} for turn in part.turns}
         body = body + of(part.masses)

@@ -82,8 +82,8 @@ def state_space(car: AbstractVehicle) -> tuple[np.ndarray, np.ndarray, np.ndarra
     mass, damping, ports = (np.asarray(getattr(form, k)) for k in ("mass", "damping", "ports"))
     others = [i for i in range(len(system.laws)) if i not in taking]
     springs = dataclasses.replace(form, ports=form.ports[np.array(others, dtype=int)])
-    rest = jnp.stack([*static_equilibrium(car.passive).values()])
-    stiffness = np.asarray(tangent_stiffness(springs, [system.laws[i] for i in others], rest))
+    at_rest = jnp.stack([*static_equilibrium(car.passive).values()])
+    stiffness = np.asarray(tangent_stiffness(springs, [system.laws[i] for i in others], at_rest))
     inertia = moves @ np.linalg.inv(mass)
     of_rates, of_stretch = -inertia @ damping @ np.linalg.inv(moves), -inertia @ stiffness @ np.linalg.inv(stretches)
     of_force = -inertia @ ports[taking].T

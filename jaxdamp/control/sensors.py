@@ -185,12 +185,12 @@ def noise_of(sensors: Sequence[Sensors | None], samples: Float[Array, " time"]) 
         samples: number of the last sample at each instant, from 0 at the beginning of the run.
     """
     places, count, columns = samples.astype(jnp.uint32), len(Signals._fields), []
-    for damper, own in enumerate(sensors):
-        if own is None:
+    for damper, kinds in enumerate(sensors):
+        if kinds is None:
             continue
-        for name in own.of_kind(SignalSensor):
+        for name in kinds.of_kind(SignalSensor):
             stream = count * damper + Signals._fields.index(name)
-            columns.append(normal_at(own.seed.astype(jnp.uint32), stream, places))
+            columns.append(normal_at(kinds.seed.astype(jnp.uint32), stream, places))
     return jnp.stack(columns, axis=-1) if columns else None
 
 
@@ -213,10 +213,10 @@ class Reader(eqx.Module):
     column: int = eqx.field(static=True)
 
     def __init__(self, sensors: Sensors | None, lag: Scalar, dt: Scalar, period: float, column: int) -> None:
-        own = Sensors() if sensors is None else sensors
-        self.sensors, self.period, self.column = own.of_kind(SignalSensor), period, column
-        self.filters = {name: (one.source, one.over(period)) for name, one in own.of_kind(AbstractFilter).items()}
-        self.subtracted = isinstance(own.wheel_velocity, Subtracted)
+        chosen = Sensors() if sensors is None else sensors
+        self.sensors, self.period, self.column = chosen.of_kind(SignalSensor), period, column
+        self.filters = {name: (one.source, one.over(period)) for name, one in chosen.of_kind(AbstractFilter).items()}
+        self.subtracted = isinstance(chosen.wheel_velocity, Subtracted)
         shares = Signals(*(1.0 - decay(dt, lag),) * len(Signals._fields))
         self.shares = shares._replace(**{name: 1.0 - decay(dt, one.lag) for name, one in self.sensors.items()})
 
@@ -227,16 +227,19 @@ class Reader(eqx.Module):
     def begin(self, seen: Signals) -> dict[str, tuple[Scalar, ...]]:
         """Of each filter its input and its states, at rest."""
         read, zero = self._direct(seen, None), jnp.zeros_like(seen.stroke)
-        return {name: (getattr(read, source), *(zero,) * len(own.gain)) for name, (source, own) in self.filters.items()}
+        return {
+            name: (getattr(read, source), *(zero,) * len(sensors.gain))
+            for name, (source, sensors) in self.filters.items()
+        }
 
     def __call__(
         self, seen: Signals, memory: dict[str, tuple[Scalar, ...]], noise: Noise | None
     ) -> tuple[Signals, dict[str, tuple[Scalar, ...]]]:
         """What the controller has at a sample, and what its filters then remember."""
         read, after = self._direct(seen, noise), {}
-        for name, (source, own) in self.filters.items():
+        for name, (source, sensors) in self.filters.items():
             (before, *state), value = memory[name], getattr(read, source)
-            after[name] = (value, *own(state, (value - before) / self.period))
+            after[name] = (value, *sensors(state, (value - before) / self.period))
         read = read._replace(**{name: state[1] for name, state in after.items()})
         if self.subtracted:
             read = read._replace(wheel_velocity=read.body_velocity - read.velocity)
@@ -255,7 +258,7 @@ class Reader(eqx.Module):
 def readers(sensors: Sequence[Sensors | None], lag: Scalar, dt: Scalar, period: float) -> tuple[Reader, ...]:
     """Of each damper; arguments as those of `Reader`."""
     made, column = [], 0
-    for own in sensors:
-        made.append(Reader(own, lag, dt, period, column))
+    for each in sensors:
+        made.append(Reader(each, lag, dt, period, column))
         column += len(made[-1].sensors)
     return tuple(made)

@@ -144,13 +144,13 @@ class _Buffered(AbstractVehiclePolicy):
         rear = {name: name.replace("rear", "front") for name in dampers if "rear" in name}
         if not rear or not {*rear.values()} <= {*dampers}:
             _checks.refuse("policy", "have a front damper for each rear one of the vehicle", ", ".join(dampers))
-        own = {name: self.policy.initial_state() for name in dampers}
-        return own, {name: (0.0,) * self.count for name in rear}
+        states = {name: self.policy.initial_state() for name in dampers}
+        return states, {name: (0.0,) * self.count for name in rear}
 
     def __call__(self, seen: Mapping[str, Signals], state: PyTree) -> tuple[dict[str, Scalar], PyTree]:
         """The demanded forces [N]."""
-        own, ahead = state
-        pairs = {name: self.policy(signals, own[name]) for name, signals in seen.items()}
+        states, ahead = state
+        pairs = {name: self.policy(signals, states[name]) for name, signals in seen.items()}
         forces, after = ({name: pair[i] for name, pair in pairs.items()} for i in range(2))
         buffers = {}
         for name, past in ahead.items():

@@ -52,8 +52,8 @@ class AbstractTube(AbstractDamper):
 
     def traits(self) -> Traits:
         """The pressures are states; the friction of the seal alone cannot balance a spring; gas is an offset."""
-        own = super().traits()._replace(has_feed_through=False, contains_offset=True)
-        return own._replace(solves_equation=True, step_angle=STEP_ANGLE)
+        inherited = super().traits()._replace(has_feed_through=False, contains_offset=True)
+        return inherited._replace(solves_equation=True, step_angle=STEP_ANGLE)
 
     def __check_init__(self) -> None:
         check_field_types(self)

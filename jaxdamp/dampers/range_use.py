@@ -107,9 +107,9 @@ def range_use(law: AbstractDamper, motion: Motion) -> list[RangeUse]:
 
 def _uses(law: AbstractDamper, motion: Motion) -> list[RangeUse]:
     """Own uses, then those of the laws inside."""
-    own = [] if law.fitted_to is None else _own_uses(law, motion)
+    uses = [] if law.fitted_to is None else _own_uses(law, motion)
     inside = [use for part, inner in law.motion_inside(motion) for use in _uses(part, inner)]
-    return own + inside
+    return uses + inside
 
 
 def _own_uses(law: AbstractDamper, motion: Motion) -> list[RangeUse]:

@@ -73,7 +73,7 @@ def settled_table(law: AbstractDamper, velocities: VectorLike, call: str, *, tur
     _checks.finite("velocities", velocity)
     if velocity.ndim != 1 or velocity.size == 0 or np.any(np.diff(velocity) <= 0):
         _checks.refuse("velocities", "be one or more, strictly increasing", velocity, "Try `numpy.unique`.")
-    curve, rest = quasi_static(law, velocity), jnp.zeros(())
+    curve, still = quasi_static(law, velocity), jnp.zeros(())
     if not set(np.sign(velocity)) - {0.0} <= set(np.sign(velocity[curve.settled])):  # a whole side is missing
         remedy = "A table cannot represent such a law: use `respond` with the intended motion."
         what = f"{type(law).__name__}. {curve.note.removesuffix('.')}"
@@ -100,7 +100,7 @@ def settled_table(law: AbstractDamper, velocities: VectorLike, call: str, *, tur
     if 0.0 in settled:  # nothing is compiled for it
         static = float(force[settled == 0.0][0])
     else:
-        static = float(law.force(rest, rest, law.initial_state()))
+        static = float(law.force(still, still, law.initial_state()))
     static *= abs(static) > 1e-9 * np.abs(force).max(initial=0.0)  # less is a rounding error
     return SettledTable(settled, force, static, comments, curve.note)
 

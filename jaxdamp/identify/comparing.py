@@ -233,9 +233,9 @@ def fit_each(
     sent = (*runs, *held_out)
 
     def given(name: str, start: Start, held: tuple[str, ...] = ()) -> tuple[object, ...]:
-        own = naming_only(named, _paths(_begun(start, runs, rig)), paths) if paths else named
-        own = {**own, "rig": rig, "freeze": (*own["freeze"], *frozen_by(laws[name]), *held)}
-        return name, start, tuple(runs), tuple(held_out), scheduled, in_time, len(laws) > 1, own
+        options = naming_only(named, _paths(_begun(start, runs, rig)), paths) if paths else named
+        options = {**options, "rig": rig, "freeze": (*options["freeze"], *frozen_by(laws[name]), *held)}
+        return name, start, tuple(runs), tuple(held_out), scheduled, in_time, len(laws) > 1, options
 
     def kept(inputs: tuple[object, ...], compute: Callable[[], Computed]) -> Rung | Failure:
         def outcome() -> Rung | Failure:
@@ -285,10 +285,10 @@ def _outcome(
         _ = result.error_shares  # which the table needs, computed here beside those of other laws
     except NUMERICAL as error:
         return Failure(name, str(error))
-    own = (name, len(result.parameters), result.fit_percent, result.rmse)
+    scored = (name, len(result.parameters), result.fit_percent, result.rmse)
     if judged is None:
-        return Rung(*own, None, None, result, result.scores, by_setting)
-    return Rung(*own, judged.fit_percent, judged.rmse, result, judged.scores, by_setting, judged.words)
+        return Rung(*scored, None, None, result, result.scores, by_setting)
+    return Rung(*scored, judged.fit_percent, judged.rmse, result, judged.scores, by_setting, judged.words)
 
 
 def _begun(law: Start, runs: Sequence[BenchRun], rig: Machine) -> Model | None:
@@ -314,5 +314,5 @@ def _differ_by_record(models: Sequence[Model | None], names: Sequence[str]) -> b
     Then all are judged on parts in time, since errors on different parts cannot be compared.
     """
     patterns = name_patterns("per_record", names)
-    own = [(model, {path for name in patterns for path in matching(_paths(model), name)}) for model in models]
-    return any(model is not None and not paths <= set(start_paths(model)) for model, paths in own)
+    by_record = [(model, {path for name in patterns for path in matching(_paths(model), name)}) for model in models]
+    return any(model is not None and not paths <= set(start_paths(model)) for model, paths in by_record)

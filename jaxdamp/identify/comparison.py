@@ -194,13 +194,15 @@ def side_by_side(
         pool.shutdown()
 
 
-def naming_only(options: Mapping[str, V], own: Sequence[str], every: Iterable[Sequence[str]]) -> dict[str, V]:
+def naming_only(options: Mapping[str, V], paths_of_law: Sequence[str], every: Iterable[Sequence[str]]) -> dict[str, V]:
     """Options of a fit that name only parameters that the law or the vehicle has, or that none has: that is refused.
 
     `own` are the paths of the parameters of this one, `every` those of each of the comparison.
     """
     paths = [*every]
-    named = {name: cast(V, _of(own, paths, cast(Names, value))) for name, value in options.items() if name in NAMED}
+    named = {
+        name: cast(V, _of(paths_of_law, paths, cast(Names, value))) for name, value in options.items() if name in NAMED
+    }
     return {**options, **named}
 
 

@@ -180,14 +180,14 @@ def fitted_models(problem: Problem, values: np.ndarray) -> tuple[list[Model], Mo
     if starts := starts_in(built):
         fitted = [s if np.isfinite(sigma) else None for s, sigma in zip(starts, problem.sigma, strict=True)]
         built = on_rig(law_of(built), rig_of(built), fitted)
-    own = {path: get(built, path) for path in problem.per_record}
+    by_record = {path: get(built, path) for path in problem.per_record}
     models = [
-        of_record(with_values(built, {path: v[i] for path, v in own.items()}), i)
-        for i in range(len(problem.runs) if own else 0)
+        of_record(with_values(built, {path: v[i] for path, v in by_record.items()}), i)
+        for i in range(len(problem.runs) if by_record else 0)
     ]
     fitted = [model for model, sigma in zip(models, problem.sigma, strict=False) if np.isfinite(sigma)]
     covered = covered_range(problem.fitted_to, fitted or built)
-    joint = with_means(built, problem.per_record) if own else built
+    joint = with_means(built, problem.per_record) if by_record else built
     return [with_range(model, covered) for model in models], with_range(joint, covered)
 
 
@@ -237,7 +237,7 @@ def _undeclared(law: AbstractDamper) -> list[str]:
     owners = [prefix for prefix, _ in laws_inside(law)]
     counts: dict[str, int] = {}
     for prefix, module in modules_inside(law):
-        owner = max((own for own in owners if prefix.startswith(own)), key=len)
+        owner = max((path for path in owners if prefix.startswith(path)), key=len)
         for field in dataclasses.fields(module):
             value = getattr(module, field.name)
             if eqx.is_inexact_array(value) and not {"parameter", "setting"} & set(field.metadata):

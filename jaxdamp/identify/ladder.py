@@ -38,8 +38,8 @@ from jaxdamp.identify.starting import LearntStart, Start
 
 def _friction(velocity: np.ndarray, force: np.ndarray) -> AbstractDamper:
     friction = CoulombFriction.guess(velocity, force)
-    rest = force - float(friction.friction_force) * np.tanh(velocity / float(friction.friction_velocity))
-    return Linear.guess(velocity, rest) + friction
+    without_friction = force - float(friction.friction_force) * np.tanh(velocity / float(friction.friction_velocity))
+    return Linear.guess(velocity, without_friction) + friction
 
 
 _MEMORYLESS = {

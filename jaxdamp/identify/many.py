@@ -141,8 +141,8 @@ def _with_reasons(many: ManyFits, law: AbstractDamper, lacking: Sequence[str], *
         must = "give finite forces and derivatives over the records of all dampers"
         _checks.refuse("law", must, f"{law}, which does not for {', '.join(left)}", "Start from another law.")
     warn_of_left_out(left, len(many))
-    own = many.reasons or ("",) * len(many)
-    return dataclasses.replace(many, reasons=tuple(a or b for a, b in zip(own, lacking, strict=True)))
+    earlier = many.reasons or ("",) * len(many)
+    return dataclasses.replace(many, reasons=tuple(a or b for a, b in zip(earlier, lacking, strict=True)))
 
 
 @one_thread()
@@ -254,9 +254,11 @@ def _record_errors(result: FitResult | None, runs: Sequence[BenchRun]) -> Float[
 def _mean_over_records(result: FitResult, path: str) -> tuple[float, float, float]:
     """Value, standard error and bias of a number, zero if it was not asked for; the mean if each record has its own."""
     names = [e.name for e in result.parameters]
-    own = [i for i, name in enumerate(names) if name == path or name.startswith(f"{path}[")]
-    chosen = [result.parameters[i] for i in own]
-    error = np.sqrt(np.mean(result.covariance[np.ix_(own, own)])) if len(own) > 1 else chosen[0].standard_error
+    indices = [i for i, name in enumerate(names) if name == path or name.startswith(f"{path}[")]
+    chosen = [result.parameters[i] for i in indices]
+    error = (
+        np.sqrt(np.mean(result.covariance[np.ix_(indices, indices)])) if len(indices) > 1 else chosen[0].standard_error
+    )
     return (
         float(np.mean([e.value for e in chosen])),
         float(error),

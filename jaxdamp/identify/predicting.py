@@ -94,7 +94,7 @@ def predict_by_record(
     """The model of each record and its force [N] there, of one model for all records or of one for each."""
     if isinstance(model, Sequence):
         pairs = zip(model, runs, strict=True)
-        return list(model), [predict_runs(own, [run], initial_state)[0] for own, run in pairs]
+        return list(model), [predict_runs(one, [run], initial_state)[0] for one, run in pairs]
     return [of_record(model, i) for i in range(len(runs))], predict_runs(model, runs, initial_state)
 
 
@@ -185,7 +185,7 @@ def compared(
     models, forces = predict_by_record(model, runs, initial_state)
     distinct = {id(each): each for each in models}.values()  # most often one model for all records
     memoryless = {id(each): is_memoryless(each) for each in distinct}
-    used = [used_samples(own, run, memoryless[id(own)], initial_state) for own, run in zip(models, runs, strict=True)]
+    used = [used_samples(law, run, memoryless[id(law)], initial_state) for law, run in zip(models, runs, strict=True)]
     if any(told):
         used = [slice(max(k.start or 0, n), k.stop) for k, n in zip(used, told, strict=True)]
     if parts is None:

@@ -143,14 +143,14 @@ def begun(
     model = with_stated(model, stated_parameters(model, fitted_to))
     frozen = [*names.find("freeze", asked["freeze"]), *names.find("freeze", frozen_by(law))]
     frozen += not_chosen(model, asked["over"], "rig.", STARTS)
-    own = _per_record(model, names.find("per_record", per_record), sigma, absent, stated)
-    own = free_by_record(own, match_paths([p.path for p in parameters(model)], frozen))
+    by_record = _per_record(model, names.find("per_record", per_record), sigma, absent, stated)
+    by_record = free_by_record(by_record, match_paths([p.path for p in parameters(model)], frozen))
     frozen += [*absent, *(p.path for p in parameters(model) if p.path in stated)]
     limits, tied = names.find_keys("bounds", bounds), names.find_keys("tie", tie)
-    free = free_parameters(spread(model, own, len(runs)), freeze=frozen, bounds=limits, tie=tied, move=True)
+    free = free_parameters(spread(model, by_record, len(runs)), freeze=frozen, bounds=limits, tie=tied, move=True)
     _checks.finite("law", free.values)
     on_parameters = priors_on(free, names.find_keys("priors", priors))
-    return Beginning(begin, model, free, own, initial_state, (*on_parameters, *expected))
+    return Beginning(begin, model, free, by_record, initial_state, (*on_parameters, *expected))
 
 
 def _records(runs: BenchRun | Iterable[BenchRun]) -> tuple[BenchRun, ...]:

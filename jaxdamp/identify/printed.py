@@ -202,7 +202,7 @@ def evaluators(free: FreeParameters, problems: Sequence[Sequence[AbstractResidua
 def rows_beside(free: FreeParameters, residuals: Sequence[AbstractResiduals]) -> Float[np.ndarray, "rows columns"]:
     """The `linear_rows` of all residuals that have some."""
     rows = (part.linear_rows(free) for part in residuals if not isinstance(part, Batch))
-    return np.concatenate([np.zeros((0, free.values.size + 1)), *(own for own in rows if own is not None)])
+    return np.concatenate([np.zeros((0, free.values.size + 1)), *(some for some in rows if some is not None)])
 
 
 def _with_numbers(

@@ -122,7 +122,7 @@ class Problem(NamedTuple):
         """The same with other measured forces [N], for derivatives and batches; `runs` and `sigma` stay."""
         ends = np.cumsum([part.measurements().size for part in self.residuals])[:-1]
         parts = zip(self.residuals, jnp.split(force, ends), strict=True)
-        return self._replace(residuals=tuple(part.with_measurements(own) for part, own in parts))
+        return self._replace(residuals=tuple(part.with_measurements(measured) for part, measured in parts))
 
     def margins(self, y: Float[Array, " free"]) -> Float[Array, " conditions"]:
         """By how much the law keeps its conditions between parameters at coordinates of the search."""
@@ -202,7 +202,7 @@ class Problem(NamedTuple):
 
     def reweighted(self, factor: Float[np.ndarray, " samples"]) -> "Problem":
         """The same with the weight of every sample times a factor; the compiled programs are the same."""
-        return self._replace(residuals=tuple(part.reweighted(own) for part, own in self.by_part(factor)))
+        return self._replace(residuals=tuple(part.reweighted(weights) for part, weights in self.by_part(factor)))
 
     def at_noise(self, noise: float | None) -> "Problem":
         """The same with priors relative to this standard deviation of the noise of a weighted sample.
@@ -293,8 +293,8 @@ def linearised(
     later &= not later.all()  # where nothing else is free there is nothing to be gained
     first, last = np.flatnonzero(~later), np.flatnonzero(later)
 
-    def simulated(own: Array) -> tuple[Array, tuple[Array, list[PyTree]]]:
-        model = free.build(values.at[first].set(own) if last.size else own)
+    def simulated(numbers: Array) -> tuple[Array, tuple[Array, list[PyTree]]]:
+        model = free.build(values.at[first].set(numbers) if last.size else numbers)
         observed = [part.observed(model) for part in residuals]
         together = _together(residuals, model, observed)
         return together, (together, observed)
@@ -303,8 +303,8 @@ def linearised(
     if not last.size:
         return together, jacobian
 
-    def sensed(own: Array) -> Array:
-        moved = free.build(values.at[last].set(own))
+    def sensed(numbers: Array) -> Array:
+        moved = free.build(values.at[last].set(numbers))
         return _together(residuals, dataclasses.replace(free.build(values), sensors=moved.sensors), observed)
 
     both = jnp.concatenate([jacobian, jax.jacfwd(sensed)(values[last])], axis=1)
@@ -313,4 +313,4 @@ def linearised(
 
 def _together(residuals: Sequence[AbstractResiduals], model: PyTree, observed: Sequence[PyTree]) -> Array:
     parts = zip(residuals, observed, strict=True)
-    return jnp.concatenate([part.compared(model, own) for part, own in parts])
+    return jnp.concatenate([part.compared(model, channels) for part, channels in parts])

@@ -78,8 +78,8 @@ def _first_states(batch: Batch, model: Model, start: Array, stop: Array, target:
     def one(
         dt: Array, x: Array, v: Array, followed: Followed, values: dict[str, Array], start: Array, stop: Array, y: Array
     ) -> tuple[State, State, State]:
-        own = with_values(model, values)
-        history = state_history(own, dt, x, v, followed)
+        model_of_record = with_values(model, values)
+        history = state_history(model_of_record, dt, x, v, followed)
         changes = jnp.where(jnp.arange(x.size)[:, None] < stop, jnp.abs(history - history[:1]), 0.0)
         size = jnp.max(changes, axis=0)
         size = jnp.where(size > 0, size, 1.0)
@@ -87,7 +87,7 @@ def _first_states(batch: Batch, model: Model, start: Array, stop: Array, target:
         constant = jax.tree.map(lambda channel: jnp.full(4, channel[0]), followed)
 
         def force(state: State) -> Array:
-            return marched(own, batch.effects, dt, rest, still, constant, 1, state)[0]
+            return marched(model_of_record, batch.effects, dt, rest, still, constant, 1, state)[0]
 
         expected = history[start]
         at_rest = _states_with_force(force, expected, size, y)
@@ -129,8 +129,8 @@ class Warmed(NamedTuple):
 def unknown_starts(model: Model, runs: Sequence[BenchRun], per_record: Collection[str]) -> list[str]:
     """Paths of the starts that a new record needs, where each of the fitted records had one of its own; else none."""
     paths = start_paths(model)
-    if own := [path for path in paths if path in per_record]:
-        return own
+    if differing := [path for path in paths if path in per_record]:
+        return differing
     warms = law_of(model).traits().temperature_dependent
     return paths if paths and warms and all(initial_temperature(run) is not None for run in runs) else []
 
@@ -178,8 +178,8 @@ class _Tried(NamedTuple):
 @compiled_for_loops
 def _shift(batch: Batch, model: Model, begin: dict[str, Array], noise: Scalar) -> Scalar:
     def missed(shift: Scalar) -> Float[Array, " samples"]:
-        own = {path: jnp.broadcast_to(value + shift, batch.dt.shape) for path, value in begin.items()}
-        return dataclasses.replace(batch, fixed=batch.fixed | own)(model) / noise
+        values = {path: jnp.broadcast_to(value + shift, batch.dt.shape) for path, value in begin.items()}
+        return dataclasses.replace(batch, fixed=batch.fixed | values)(model) / noise
 
     def at(shift: Scalar) -> tuple[Scalar, Scalar]:
         residual, slope = jax.jvp(missed, (shift,), (jnp.ones_like(shift),))

@@ -52,20 +52,20 @@ def simpler_laws(law: AbstractDamper, weak: Sequence[str], fastest: float, path:
     >>> [simpler.words for simpler in simpler_laws(law, ["lag_time", "law.terms.1.friction_force"], 0.5)]
     ['with Linear + CoulombFriction for Lag(Linear + CoulombFriction)', 'without CoulombFriction']
     """
-    own = [name for name in weak if name.startswith(path)]
-    if not own:
+    inside = [name for name in weak if name.startswith(path)]
+    if not inside:
         return
     if isinstance(law, Sum):
-        yield from _of_sum(law, own, fastest, path)
+        yield from _of_sum(law, inside, fastest, path)
     elif isinstance(law, AbstractWrapper):
-        yield from _of_wrapper(law, own, fastest, path)
+        yield from _of_wrapper(law, inside, fastest, path)
     else:
-        plain = law.plainer([name.removeprefix(path) for name in own], fastest)
+        plain = law.plainer([name.removeprefix(path) for name in inside], fastest)
         if plain is not None:
             held = held_of(plain, fastest)
             words = f"with {_in_words(plain)} for {_in_words(law)}" + f", {', '.join(held)} held" * bool(held)
-            yield Simpler(plain, words, len(own), len(own) / (_size(law) - _size(plain) + len(held)))
-        yield from _at_zero(law, own, path)
+            yield Simpler(plain, words, len(inside), len(inside) / (_size(law) - _size(plain) + len(held)))
+        yield from _at_zero(law, inside, path)
 
 
 def _of_sum(law: Sum, weak: Sequence[str], fastest: float, path: str) -> Iterator[Simpler]:
@@ -73,9 +73,9 @@ def _of_sum(law: Sum, weak: Sequence[str], fastest: float, path: str) -> Iterato
     for i, term in enumerate(law.terms):
         place, before, after = f"{path}terms.{i}.", law.terms[:i], law.terms[i + 1 :]
         inside = [name for name in weak if name.startswith(place)]
-        rest = before + after
-        if rest and inside:
-            less = rest[0] if len(rest) == 1 else Sum(rest)
+        others = before + after
+        if others and inside:
+            less = others[0] if len(others) == 1 else Sum(others)
             yield Simpler(less, f"without {_in_words(term)}", len(inside), len(inside) / _size(term))
         for part in simpler_laws(term, inside, fastest, place):
             instead = part.law.terms if isinstance(part.law, Sum) else (part.law,)
@@ -88,13 +88,13 @@ def _of_wrapper(law: AbstractWrapper, weak: Sequence[str], fastest: float, path:
     inner = law.inner_law()
     field = next(f.name for f in dataclasses.fields(law) if getattr(law, f.name) is inner)
     inside = [name for name in weak if name.startswith(f"{path}{field}.")]
-    own = [name for name in weak if name not in inside]
-    if own:
+    outside = [name for name in weak if name not in inside]
+    if outside:
         words = f"with {_in_words(inner)} for {_in_words(law)}"
-        yield Simpler(inner, words, len(own), len(own) / (_size(law) - _size(inner)))
+        yield Simpler(inner, words, len(outside), len(outside) / (_size(law) - _size(inner)))
     for part in simpler_laws(inner, inside, fastest, f"{path}{field}."):
         yield part._replace(law=dataclasses.replace(law, **{field: part.law}))
-    yield from _at_zero(law, own, path)
+    yield from _at_zero(law, outside, path)
 
 
 def _at_zero(law: AbstractDamper, weak: Sequence[str], path: str) -> Iterator[Simpler]:

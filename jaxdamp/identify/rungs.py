@@ -146,8 +146,8 @@ def not_worse(errors: Mapping[str, Sequence[float]], best: str) -> list[str]:
     ['b']
     """
     alike = []
-    for name, own in errors.items():
-        ratios = np.log(np.maximum(own, 1e-300) / np.maximum(errors[best], 1e-300))
+    for name, of_rung in errors.items():
+        ratios = np.log(np.maximum(of_rung, 1e-300) / np.maximum(errors[best], 1e-300))
         n = ratios.size
         spread = float(np.std(ratios, ddof=1) / np.sqrt(n)) if n >= FEWEST_PARTS else 0.0
         if name != best and float(np.mean(ratios)) < max(spread, ALIKE):

@@ -93,8 +93,8 @@ def _of_record(
     if not np.any(used):
         return np.ones(used.size)
     samples, moving = np.flatnonzero(used), used & (np.abs(velocity) > MOVING * np.abs(velocity[used]).max())
-    rest = np.count_nonzero(samples < np.argmax(moving))
-    last = samples[rest + int(SHARE * (samples.size - rest - 1))]
+    pause = np.count_nonzero(samples < np.argmax(moving))
+    last = samples[pause + int(SHARE * (samples.size - pause - 1))]
     for signal in (stroke, velocity):
         for way in (signal, -signal):
             low, high = way[used].min(), way[used].max()

@@ -71,10 +71,12 @@ class LearntStart:
             stop = 1
         else:
             stop = sorted(range(len(runs)), key=lambda i: runs[i].peak_velocity)[len(runs) // 2]
-        rest = [run for i, run in enumerate(runs) if i != stop]
+        trained_on = [run for i, run in enumerate(runs) if i != stop]
         how: dict[str, Any] = {"steps": STEPS, "patience": PATIENCE, "learning_rate": LEARNING_RATE}
         how |= {"weighting": "runs", "samples_per_cycle": SAMPLES_PER_CYCLE, "bad_records": "keep"} | self.options
-        return [train(self.untrained(rest, key), rest, held_out=runs[stop], **how) for key in range(self.keys)]
+        return [
+            train(self.untrained(trained_on, key), trained_on, held_out=runs[stop], **how) for key in range(self.keys)
+        ]
 
     def untrained(self, runs: Sequence[BenchRun], key: int = 0) -> AbstractDamper:
         """A third of the damping in one coefficient, random weights, and the spring of the records."""

@@ -71,10 +71,10 @@ class Batch(AbstractWeighted):
             state: Array | None,
             values: dict[str, Array],
         ) -> tuple[Array, Array]:
-            own, change = with_values(model, values), jnp.zeros(())
+            model_of_record, change = with_values(model, values), jnp.zeros(())
             if cycle is not None:
-                state, change = initial_state(own, self.effects, x[0], cycle, followed)
-            return marched(own, self.effects, dt, x, v, followed, self.substeps, state), change
+                state, change = initial_state(model_of_record, self.effects, x[0], cycle, followed)
+            return marched(model_of_record, self.effects, dt, x, v, followed, self.substeps, state), change
 
         starts = [start.initial_state for start in starts_in(model) if start is not None]
         estimated = jnp.stack(starts)[self.number] if starts else None
@@ -161,10 +161,10 @@ def _batch(
     weight = np.stack([_pad(row.weight, length, "constant") for row in rows])
     number = np.array([row.number for row in rows])
     dt, substeps = np.array([row.dt for row in rows]), max(row.substeps for row in rows)
-    own = {path: on_device(np.array(values, float)[number]) for path, values in fixed.items()}
+    on_devices = {path: on_device(np.array(values, float)[number]) for path, values in fixed.items()}
     arrays = (on_device(dt), stroke, velocity, force, on_device(weight), on_device(number))
     followed = dict(zip(channels[3:], others, strict=True))
-    return Batch(*arrays, own, per_record, substeps, cycle=cycles_of(rows, runs), effects=effects, **followed)
+    return Batch(*arrays, on_devices, per_record, substeps, cycle=cycles_of(rows, runs), effects=effects, **followed)
 
 
 def _memoryless_batch(
@@ -238,9 +238,9 @@ def batches_of_each(
         for number, group in enumerate(groups):
             for k, i in enumerate(group):
                 ranges[i] = SampleRange(number, k, rows[i].warm_up, len(rows[i].weight), rows[i].block)
-        own = {path: values[first : first + len(runs)] for path, values in fixed.items()}
+        of_damper = {path: values[first : first + len(runs)] for path, values in fixed.items()}
         members = [([rows[i] for i in group], [runs[i] for i in group]) for group in groups]
-        made = tuple(_batch(*of, own, per_record, effects, channels) for of in members)
+        made = tuple(_batch(*of, of_damper, per_record, effects, channels) for of in members)
         each.append((made, [ranges[i] for i in range(len(runs))]))
         first += len(runs)
     return each

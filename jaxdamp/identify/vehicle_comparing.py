@@ -159,10 +159,10 @@ def _smallest(rungs: Sequence[VehicleRung]) -> dict[str, float]:
     errors: dict[str, list[float]] = {}
     for rung in rungs:
         for channel in dict.fromkeys(c for ride in rung.result.records for c in ride.channels):
-            own = [score.rmse for score in rung.result.scores if score.channel == channel]
-            errors.setdefault(channel, []).append(float(np.sqrt(np.mean(np.square(own)))))
+            rmse = [score.rmse for score in rung.result.scores if score.channel == channel]
+            errors.setdefault(channel, []).append(float(np.sqrt(np.mean(np.square(rmse)))))
     level = {c: np.std(np.concatenate([r[c] for r in rungs[0].result.records if c in r.channels])) for c in errors}
-    return {channel: max(min(own), EXACT * float(level[channel])) for channel, own in errors.items()}
+    return {channel: max(min(rmse), EXACT * float(level[channel])) for channel, rmse in errors.items()}
 
 
 def compare_vehicles(
@@ -209,9 +209,9 @@ def fit_each_vehicle(
     in_time = any(matching(paths, name) for paths in by_vehicle.values() for name in of_drives)
 
     def fitted(name: str, vehicle: AbstractVehicle) -> VehicleRung | Failure:
-        own = naming_only(options, by_vehicle[name], by_vehicle.values())
+        named = naming_only(options, by_vehicle[name], by_vehicle.values())
         try:
-            result = fit_vehicle(vehicle, rides, **own)
+            result = fit_vehicle(vehicle, rides, **named)
             judged = on_drives(result, held_out) if held_out else without_drives(result, in_time=in_time)
         except (ValueError, ArithmeticError) as error:
             return Failure(name, str(error))
@@ -290,9 +290,9 @@ def _quarter(ride: RideRecord) -> np.ndarray:
 def _refitted(problem: Problem, left: Sequence[Bool[np.ndarray, " _"]]) -> VehicleTest:
     """The model fitted to the samples that are not left out."""
     factor = np.ones(problem.used.size)
-    for part, own in problem.by_part(factor):
+    for part, weights in problem.by_part(factor):
         if isinstance(part, RideBatch):
-            shaped = own.reshape(part.weight.shape)
+            shaped = weights.reshape(part.weight.shape)
             for row, number in enumerate(np.asarray(part.number)):
                 shaped[row, :, left[number]] = 0.0
     end = search(problem.reweighted(factor), REFIT_STEPS)

@@ -112,7 +112,7 @@ def on_sensors(
     regression = _regressed(problem, end, columns)
     if regression is None:
         return []
-    chosen = [effect for effect, own in zip(effects, regression.shown, strict=True) if own]
+    chosen = [effect for effect, is_shown in zip(effects, regression.shown, strict=True) if is_shown]
     sentences = []
     for (channel, effect), size, error in zip(chosen, map(float, regression.sizes), regression.errors, strict=True):
         values = np.concatenate([record[channel] for record in records if channel in record.channels])
@@ -170,15 +170,15 @@ def _regressed(problem: Problem, end: SearchEnd, effects: Sequence[np.ndarray]) 
     if not columns.size or not np.all(np.isfinite(columns)):
         return None
     basis, _ = np.linalg.qr(end.jacobian / np.linalg.norm(end.jacobian, axis=0).clip(1e-300))
-    own, rest = (a - basis @ (basis.T @ a) for a in (columns, end.residual))
-    shown = np.linalg.norm(own, axis=0) > OF_ITS_OWN * np.linalg.norm(columns, axis=0)
+    left_columns, left_residual = (a - basis @ (basis.T @ a) for a in (columns, end.residual))
+    shown = np.linalg.norm(left_columns, axis=0) > OF_ITS_OWN * np.linalg.norm(columns, axis=0)
     if not shown.any():
         return None
-    inverse = np.linalg.pinv(own[:, shown])
-    sizes = inverse @ rest
-    left = rest - own[:, shown] @ sizes
+    inverse = np.linalg.pinv(left_columns[:, shown])
+    sizes = inverse @ left_residual
+    left = left_residual - left_columns[:, shown] @ sizes
     errors = np.linalg.norm(inverse * channel_noise(problem, left, end.values.size).by_sample, axis=1)
-    return _Regression(shown, sizes, errors, float(left @ left) / max(float(rest @ rest), 1e-300))
+    return _Regression(shown, sizes, errors, float(left @ left) / max(float(left_residual @ left_residual), 1e-300))
 
 
 class Friction(NamedTuple):

@@ -110,8 +110,8 @@ def respond_exactly(system: StateSpace, signal: Signal, dt: ScalarLike, start: S
 
         rise = jnp.asarray(expm(growth * float(concrete) + shift) - np.eye(n + 2), signal.dtype)
     output = jnp.asarray(system.output_vector, signal.dtype)
-    rest = np.zeros(n, signal.dtype) if start is None else jnp.full(n, start, signal.dtype)
-    return _run(rise, output, jnp.asarray(system.feed_through, signal.dtype), signal, rest)
+    initial = np.zeros(n, signal.dtype) if start is None else jnp.full(n, start, signal.dtype)
+    return _run(rise, output, jnp.asarray(system.feed_through, signal.dtype), signal, initial)
 
 
 @jax.jit

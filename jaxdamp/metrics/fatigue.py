@@ -172,9 +172,9 @@ def _damage(moments: Float[Array, "4"], k: Scalar) -> tuple[Scalar, Scalar]:
     gamma = jnp.where(wide, irregularity, 0.7)
     mean_frequency = jnp.where(wide, m1 / m0 * jnp.sqrt(m2 / m4), 0.6)
     d1 = 2.0 * (mean_frequency - gamma**2) / (1.0 + gamma**2)
-    rest = 1.0 - gamma - d1 + d1**2
-    r = (gamma - mean_frequency - d1**2) / rest
-    d2 = rest / (1.0 - r)
+    remainder = 1.0 - gamma - d1 + d1**2
+    r = (gamma - mean_frequency - d1**2) / remainder
+    d2 = remainder / (1.0 - r)
     d3 = 1.0 - d1 - d2
     q = 1.25 * (gamma - d3 - d2 * r) / d1
     shape = d1 * q**k * jnp.exp(gammaln(1.0 + k)) + rayleigh * (d2 * jnp.abs(r) ** k + d3)

@@ -80,8 +80,8 @@ class Metric:
 
     def weighted_by(self, weighting: str | None) -> "Metric":
         """The same metric, of the same name, with another weighting."""
-        rest = {"by": self.by, "from_rest": self.from_rest, "window": self.window, "name": self.name}
-        return Metric(self.channel, self.statistic, weighting, **rest)
+        fields = {"by": self.by, "from_rest": self.from_rest, "window": self.window, "name": self.name}
+        return Metric(self.channel, self.statistic, weighting, **fields)
 
     def unit(self, units: Mapping[str, str]) -> str:
         """Its unit, from those of the channels."""

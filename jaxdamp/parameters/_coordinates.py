@@ -76,13 +76,13 @@ class Coordinates(eqx.Module):
         slopes, ends = np.zeros((self.free.values.size,) * 2), np.cumsum([p.value.size for p in self.free.chosen])
         smooth = []
         for p, unit, end in zip(self.free.chosen, self.units, ends, strict=True):
-            own = slice(int(end) - p.value.size, int(end))
+            place = slice(int(end) - p.value.size, int(end))
             if not _is_smooth(self.smooth, p):
-                slopes[own, own] = np.diag(np.ravel(np.asarray(unit)))
+                slopes[place, place] = np.diag(np.ravel(np.asarray(unit)))
             elif p.domain.slopes is None:
                 return None
             else:
-                smooth.append((own, p.domain, np.asarray(_scale(p))))
+                smooth.append((place, p.domain, np.asarray(_scale(p))))
         return HostMap(np.diag(slopes).copy(), slopes, tuple(smooth))
 
     def from_physical(self, values: Vector) -> Vector:
@@ -117,9 +117,9 @@ class Coordinates(eqx.Module):
         rows, gaps = [np.zeros((0, units.size))], [np.zeros(0)]
         for p, end in zip(self.free.chosen, ends, strict=True):
             if p.domain.ordered and not _is_smooth(self.smooth, p):
-                own = np.arange(end - p.value.size, end)
-                rows.append(np.diff(np.diag(units)[own], axis=0))
-                gaps.append(np.full(own.size - 1, LEAST_GAP * units[own].max()))
+                numbers = np.arange(end - p.value.size, end)
+                rows.append(np.diff(np.diag(units)[numbers], axis=0))
+                gaps.append(np.full(numbers.size - 1, LEAST_GAP * units[numbers].max()))
         return np.concatenate(rows), np.concatenate(gaps)
 
     def at_ends(self, values: Float[np.ndarray, " free"]) -> Float[np.ndarray, " free"]:
@@ -159,9 +159,9 @@ class HostMap(NamedTuple):
     ) -> tuple[Float[np.ndarray, " free"], Float[np.ndarray, "free free"]]:
         """Values and derivatives at coordinates."""
         values, slopes = y * self.units, self.slopes.copy() if self.smooth else self.slopes
-        for own, domain, scale in self.smooth:
+        for place, domain, scale in self.smooth:
             assert domain.slopes is not None
-            values[own], slopes[own, own] = domain.from_raw(y[own], scale), domain.slopes(y[own], scale)
+            values[place], slopes[place, place] = domain.from_raw(y[place], scale), domain.slopes(y[place], scale)
         return values, slopes
 
 

@@ -152,9 +152,9 @@ class Rides:
 
 def without_answer(tuned: TuneResult) -> str:
     """The sentence of the verdict without the answer, which stands above it."""
-    lead, _, rest = tuned.verdict.sentence.partition(": ")
-    said = tuned.verdict.outcome.value.startswith(lead) and rest
-    return _style.first_upper(_style.said(rest)) if said else _style.said(tuned.verdict.sentence)
+    lead, _, explanation = tuned.verdict.sentence.partition(": ")
+    said = tuned.verdict.outcome.value.startswith(lead) and explanation
+    return _style.first_upper(_style.said(explanation)) if said else _style.said(tuned.verdict.sentence)
 
 
 def constant_damping(shown: Rides, comfort: Sequence[str], grip: Sequence[str]) -> tuple[np.ndarray, np.ndarray] | str:
@@ -184,8 +184,8 @@ def _slope(law: AbstractDamper) -> float:
 def element(shown: Rides, path: str, number: int) -> str | None:
     """The name of a damper by the path of its law, of several with this law the first on its axle; None without one."""
     car, frame = shown.passive[number], shown.passive[number].frame()
-    law, own = get(car, path), [name for name in frame.element_names if not name.endswith("lift_off")]
-    with_it = [name for name in own if frame.element(name).law is law]
+    law, names = get(car, path), [name for name in frame.element_names if not name.endswith("lift_off")]
+    with_it = [name for name in names if frame.element(name).law is law]
     return next((n for n in with_it if n.startswith(path.partition(".")[0])), next(iter(with_it), None))
 
 

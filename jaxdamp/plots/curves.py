@@ -87,8 +87,8 @@ def force_velocity(
     axes.set_xlim(float(points.min()), float(points.max()))
     _name(figure, axes, measured, curves, shaded)
     said = f"The measured points are drawn without the static force of {_style.quantity(without, 'N', 'static force')}"
-    own = ", and each law with the difference of its own" * any(extra.values())
-    remarks = [note, f"{said}{own}: gas or zero error." if runs and (without or own) else "", *gaps, _alike(curves)]
+    words = ", and each law with the difference of its own" * any(extra.values())
+    remarks = [note, f"{said}{words}: gas or zero error." if runs and (without or words) else "", *gaps, _alike(curves)]
     _style.note_below(figure, [remark for remark in remarks if remark])
     return figure
 

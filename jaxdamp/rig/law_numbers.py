@@ -27,8 +27,8 @@ class LawNumbers(NamedTuple):
 
     def built(self, arrays: Sequence[object]) -> PyTree:
         """The same with other numbers."""
-        rest = iter(arrays)
-        return jax.tree.unflatten(self.tree, [next(rest) if leaf is None else leaf for leaf in self.others])
+        numbers = iter(arrays)
+        return jax.tree.unflatten(self.tree, [next(numbers) if leaf is None else leaf for leaf in self.others])
 
     @property
     def flat(self) -> np.ndarray:

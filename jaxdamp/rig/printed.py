@@ -302,7 +302,7 @@ def printed_forces(
     if law is None:
         return None
     forces, none = [], MachinePlaces(-1, -1, -1)
-    for p, row in zip((own.flat for own in numbers), rows, strict=True):
+    for p, row in zip((each.flat for each in numbers), rows, strict=True):
         record = row.on_machine(law.machine(p).delay)
         forces.append(row.shown(law.forces(p, record)[:, None], record, law.machine(p), none)[:, 0])
     return forces

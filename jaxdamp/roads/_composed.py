@@ -136,18 +136,18 @@ class Joined(AbstractRoad):
     @property
     def duration(self) -> float | None:
         """The time [s] at which the second road ends or repeats."""
-        at, rest = _checks.concrete(self.at), self.second.duration
-        return None if at is None or rest is None else float(at) + rest
+        at, second = _checks.concrete(self.at), self.second.duration
+        return None if at is None or second is None else float(at) + second
 
     @property
     def longest_run(self) -> float | None:
         """Until the second road repeats, or the first one before it does [s]."""
-        at, own, rest = behind(self.at), self.first.longest_run, self.second.longest_run
+        at, first, second = behind(self.at), self.first.longest_run, self.second.longest_run
         if at is None:
             return None
-        if own is not None and own < np.max(at) * (1.0 - 1e-9):
-            return own
-        return None if rest is None else float(np.min(at)) + rest
+        if first is not None and first < np.max(at) * (1.0 - 1e-9):
+            return first
+        return None if second is None else float(np.min(at)) + second
 
     @property
     def span(self) -> tuple[Scalar | float, Scalar | float]:

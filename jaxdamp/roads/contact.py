@@ -38,8 +38,8 @@ class ContactPatch(AbstractOnOneRoad):
     @property
     def shortest_event(self) -> float | None:
         """That of the road [s], longer by the time in which the patch passes."""
-        own, passing = self.road.shortest_event, behind(self.passing_time)
-        return None if own is None or passing is None else own + float(np.min(passing))
+        shortest, passing = self.road.shortest_event, behind(self.passing_time)
+        return None if shortest is None or passing is None else shortest + float(np.min(passing))
 
     @property
     def speed(self) -> Scalar:

@@ -158,8 +158,8 @@ def autoregressive(noise: Float[Array, " samples"], correlation: Scalar) -> Floa
         u = correlation * u + innovation * e
         return u, u
 
-    _, rest = jax.lax.scan(advance, noise[0], noise[1:])
-    return jnp.concatenate([noise[:1], rest])
+    _, following = jax.lax.scan(advance, noise[0], noise[1:])
+    return jnp.concatenate([noise[:1], following])
 
 
 @final

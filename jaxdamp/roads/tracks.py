@@ -100,8 +100,10 @@ class TwoTrack(AbstractOnSeveralRoads):
         if left.amplitudes == "fixed":
             return super().reseeded(seed)
         gamma, remainder = _gamma(left, self.track_width), _others(seed, left.phase.size)
-        rest = _parts_of(right.phase, right.relative_amplitude) - _parts_of(left.phase, gamma * left.relative_amplitude)
-        turned, scaled = _polar(rest)
+        difference = _parts_of(right.phase, right.relative_amplitude) - _parts_of(
+            left.phase, gamma * left.relative_amplitude
+        )
+        turned, scaled = _polar(difference)
         phase, size = shifted(turned, scaled / jnp.sqrt((1.0 - gamma) * (1.0 + gamma)), remainder)
         other = left.reseeded(seed)
         return TwoTrack((other, _coherent(other, gamma, phase, size)), self.track_width)
@@ -209,6 +211,6 @@ def _coherent(
     left: Iso8608, gamma: Float[Array, " lines"], phase: Float[Array, " lines"], size: Float[Array, " lines"]
 ) -> Iso8608:
     """A track whose cosines are gamma times those of `left` and sqrt(1 - gamma^2) times others."""
-    shared, rest = gamma * left.relative_amplitude, jnp.sqrt((1.0 - gamma) * (1.0 + gamma)) * size
-    drawn = _polar(_parts_of(left.phase, shared) + _parts_of(phase, rest))
+    shared, independent = gamma * left.relative_amplitude, jnp.sqrt((1.0 - gamma) * (1.0 + gamma)) * size
+    drawn = _polar(_parts_of(left.phase, shared) + _parts_of(phase, independent))
     return eqx.tree_at(lambda road: (road.phase, road.relative_amplitude), left, drawn)

@@ -113,7 +113,7 @@ class Adaptive(AbstractEngine):
         gathered = observer.begin(now, ground)
         first = observer.saved(now, gathered)
         gathered, saved = jax.lax.scan(add, gathered, jax.tree.map(lambda y: y[1:], instants))
-        records = jax.tree.map(lambda y, rest: jnp.concatenate([y[None], rest]), first, saved)
+        records = jax.tree.map(lambda y, following: jnp.concatenate([y[None], following]), first, saved)
         last, _ = see(jax.tree.map(lambda y: y[-1], instants))
         return Outcome(gathered, records, equations.ports.by_port(last.states), status, last)
 

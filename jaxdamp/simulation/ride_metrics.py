@@ -108,8 +108,8 @@ def _computed(
     """The values of statistics, each over its samples; one program for all vehicles and laws."""
     values = {}
     for name, (statistic, (first, last)) in chosen.items():
-        signal, rest, by = signals[name]
-        signal = signal if rest is None else signal - rest
+        signal, offset, by = signals[name]
+        signal = signal if offset is None else signal - offset
         signal = signal if by is None else signal * by
         values[name] = statistic.of(signal[first : last + 1], dt)
     return values

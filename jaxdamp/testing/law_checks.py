@@ -111,10 +111,10 @@ def check_inside_wrappers(law: AbstractDamper) -> None:
                 continue
             raise AssertionError(f"`{name}` takes the law, which it must refuse for its {why}.")
     stroke, forces = (np.asarray(a) for a in _forces((law, *wrapped.values())))
-    own, by_wrapper = forces[0], dict(zip(wrapped, forces[1:], strict=True))
+    bare, by_wrapper = forces[0], dict(zip(wrapped, forces[1:], strict=True))
     for name, force in by_wrapper.items():
         require(np.all(np.isfinite(force)), f"`{name}` has forces that are not finite: {force}.")
-    for name, expected in expected_forces(own, stroke).items():
+    for name, expected in expected_forces(bare, stroke).items():
         atol = 1e-9 * float(np.max(np.abs(expected)))
         require_equal(by_wrapper[name], expected, f"`{name}` must follow from the law's own force.", atol=atol)
 

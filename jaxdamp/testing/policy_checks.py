@@ -38,9 +38,9 @@ class _Flat(NamedTuple):
 
 
 def _flat(policy: Policy) -> _Flat:
-    own, rest = eqx.partition(policy, eqx.is_inexact_array)
+    own, static = eqx.partition(policy, eqx.is_inexact_array)
     numbers, build = ravel_pytree(own)
-    return _Flat(numbers, lambda numbers: eqx.combine(build(numbers), rest))
+    return _Flat(numbers, lambda numbers: eqx.combine(build(numbers), static))
 
 
 def _signals(samples: int = SAMPLES) -> Signals:
@@ -133,10 +133,12 @@ def check_derivatives(policy: Policy) -> None:
     """Forward mode, reverse mode and central differences of the demands agree in numbers and signals."""
     flat, signals = _flat(policy), _signals()
     demands, slopes = map(np.asarray, _answers(policy, signals)[:2])
-    own, size = np.asarray(flat.numbers), _largest(demands)
-    scale = np.where(own != 0.0, np.abs(own), size / np.maximum(np.max(np.abs(slopes), axis=0, initial=0.0), 1e-300))
+    numbers, size = np.asarray(flat.numbers), _largest(demands)
+    scale = np.where(
+        numbers != 0.0, np.abs(numbers), size / np.maximum(np.max(np.abs(slopes), axis=0, initial=0.0), 1e-300)
+    )
     way = (
-        jnp.asarray(scale * np.cos(np.arange(own.size))),
+        jnp.asarray(scale * np.cos(np.arange(numbers.size))),
         Signals(*(y * np.cos(k + np.arange(SAMPLES)) for k, y in enumerate(signals))),
     )
     weights = jnp.asarray(np.cos(np.arange(SAMPLES) + 0.5), float)

@@ -33,7 +33,7 @@ def relaxation(task: DesignTask[AbstractVehicle], ended: Ended, limits: tuple[Se
         limit, end = of[ends[i].name], ends[i]
         if not limit.is_shape:
             prices.setdefault((limit.of, end.sign), []).append((price * end.scale, i))
-    totals = {limit: sum(price for price, _ in own) for limit, own in prices.items()}
+    totals = {limit: sum(price for price, _ in each) for limit, each in prices.items()}
     if not totals:
         return ""
     dearest = max(totals, key=totals.__getitem__)

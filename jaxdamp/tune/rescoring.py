@@ -231,8 +231,10 @@ def driver(
         if isinstance(road, Scenarios):
             ride = road.ride(car, metrics=metrics, **run)
             each = objective.of_each(ride.each()) if objective else ride.each()
-            own = {one: each[name][i] for name in limited for i, one in enumerate(in_scenarios(name, ride.names))}
-            return {name: ride.risk(values, ride.weights) for name, values in each.items()} | own
+            of_scenarios = {
+                one: each[name][i] for name in limited for i, one in enumerate(in_scenarios(name, ride.names))
+            }
+            return {name: ride.risk(values, ride.weights) for name, values in each.items()} | of_scenarios
         values = Ride(car, road, metrics=metrics, **run)()
         return objective.of(values) if objective else values
 

@@ -168,8 +168,8 @@ class ShapeNumbers(NamedTuple):
     @property
     def names(self) -> list[str]:
         """The names of the numbers."""
-        own = [name for shape, path in self.pairs for name in _names(shape, path)]
-        return own + [name for name, *_ in self.conditions]
+        of_curves = [name for shape, path in self.pairs for name in _names(shape, path)]
+        return of_curves + [name for name, *_ in self.conditions]
 
     def limits(self, start: Mapping[str, float]) -> list[Limit]:
         """The limits of the numbers; their distances are scaled by the largest number of the curve at the start."""
@@ -218,8 +218,8 @@ def _moves_curve(law: AbstractDamper, path: str, free: FreeParameters) -> bool:
 def curve_velocities(law: AbstractDamper) -> Float[np.ndarray, " points"] | None:
     """The velocities [m/s] of the points of a curve, or some in its range; None of a law without such settings."""
     declared = {field.name: field.metadata.get("setting", {}).get("unit") for field in dataclasses.fields(law)}
-    own = (np.asarray(getattr(law, name), float) for name, unit in declared.items() if unit == "m/s")
-    points = next((values for values in own if values.ndim == 1), None)
+    numbers = (np.asarray(getattr(law, name), float) for name, unit in declared.items() if unit == "m/s")
+    points = next((values for values in numbers if values.ndim == 1), None)
     return points if points is None or points.size > 2 else np.linspace(points[0], points[-1], POINTS + 1)
 
 

@@ -189,11 +189,11 @@ def _with_cavities(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The forces, with those of settled states where these differ by more, and where: a search sees no cavities."""
     count = wanted.velocity.size
-    own = compared.copy()
+    table = compared.copy()
     if count:
-        own[:count] = np.asarray(quasi_static(law, wanted.velocity).force)
-    cavities = np.abs(own - compared) > allowed  # not where no state settles
-    return np.where(cavities, own, compared), cavities
+        table[:count] = np.asarray(quasi_static(law, wanted.velocity).force)
+    cavities = np.abs(table - compared) > allowed  # not where no state settles
+    return np.where(cavities, table, compared), cavities
 
 
 def _best(

@@ -95,11 +95,11 @@ def of_channel(metric: Metric, layout: Layout, argument: str) -> Metric:
     channels = layout.by_name
     for name in (metric.channel, metric.by) if metric.by else (metric.channel,):
         _checks.one_of(f"channel of {argument}", name, channels)
-    own = channels[metric.channel].kind.weighting
-    if metric.weighting is not None and own is None:
+    weighting = channels[metric.channel].kind.weighting
+    if metric.weighting is not None and weighting is None:
         remedy = f"Leave its `weighting` out; {metric.channel} is {channels[metric.channel].kind.meaning}."
         _checks.refuse(argument, "weight an acceleration, as ISO 2631-1 does", repr(metric.channel), remedy)
     counts = {m.channel: m.statistic for m in layout.metrics if m.statistic in LIFT_OFF_FRACTIONS}
     if metric.statistic in LIFT_OFF_FRACTIONS and metric.channel in counts:
         return dataclasses.replace(metric, statistic=counts[metric.channel])
-    return metric.weighted_by(own) if metric.weighting == "default" else metric
+    return metric.weighted_by(weighting) if metric.weighting == "default" else metric

@@ -151,13 +151,13 @@ class Drawing:
 
     def _of_body(self, body: str) -> list[int]:
         """The points of a body from rear to front; of a wheel one, of a walking beam several."""
-        own = [number for number, end in enumerate(self._drawn) if end.body == body]
-        return sorted(own, key=lambda number: self._drawn[number].ahead)
+        numbers = [number for number, end in enumerate(self._drawn) if end.body == body]
+        return sorted(numbers, key=lambda number: self._drawn[number].ahead)
 
     def _corners(self, body: str) -> list[int]:
         """Points round a body, beyond those where something is attached: two of a body seen as a bar, else four."""
-        own = [end for end in self._drawn if end.body == body] or [_End(body, 0.0, 0.0)]
-        ahead, left = [end.ahead for end in own], [end.left for end in own]
+        ends = [end for end in self._drawn if end.body == body] or [_End(body, 0.0, 0.0)]
+        ahead, left = [end.ahead for end in ends], [end.left for end in ends]
         fore, aft = max(ahead) + OVERHANG, min(ahead) - OVERHANG
         sides = sorted({max(left), min(left)})
         round_it = [(fore, sides[0]), (aft, sides[0])]

@@ -170,11 +170,14 @@ class Frame(eqx.Module):
 
     def elements(self, static_loads: Float[Array, " wheels"] | None = None) -> tuple[AbstractDamper, ...]:
         """The law at each port, for given static wheel loads [N]; they are computed if left out."""
-        own = tuple(element.together for _, _, element in self._elements())
+        together = tuple(element.together for _, _, element in self._elements())
         if not any(wheel.lifts for wheel in self.wheels):
-            return own
+            return together
         loads = self.static_wheel_loads() if static_loads is None else static_loads
-        return (*own, *[lift_off(wheel, load) for wheel, load in zip(self.wheels, loads, strict=True) if wheel.lifts])
+        return (
+            *together,
+            *[lift_off(wheel, load) for wheel, load in zip(self.wheels, loads, strict=True) if wheel.lifts],
+        )
 
     def element(self, name: str) -> Element:
         """The element of a name, with the law of a single one of several equal ones."""
@@ -224,17 +227,17 @@ class Frame(eqx.Module):
             form: the matrices; computed if left out.
         """
         form = self.port_form() if form is None else form
-        own = [element.together for _, _, element in self._elements()]
-        standing = None if form.port_road is None else form.port_road[: len(own)]
-        form = dataclasses.replace(form, ports=form.ports[: len(own)], port_road=standing)  # without lift-off
+        together = [element.together for _, _, element in self._elements()]
+        standing = None if form.port_road is None else form.port_road[: len(together)]
+        form = dataclasses.replace(form, ports=form.ports[: len(together)], port_road=standing)  # without lift-off
         heights = np.array([name in {f"z_{body.name}" for body in self.bodies} for name in self.coordinates])
-        stiffness = tangent_stiffness(form, own, jnp.zeros(len(self.coordinates)))
+        stiffness = tangent_stiffness(form, together, jnp.zeros(len(self.coordinates)))
         deflected = solve(stiffness, -jnp.diag(form.mass) * (STANDARD_GRAVITY * heights))
         tyres = jnp.stack([wheel.stiffness for wheel in self.wheels])
         loads = -tyres * (matrix([wheel.point for wheel in self.wheels], self.coordinates) @ deflected)
         direct = [i for i, (_, part, _) in enumerate(self._elements()) if isinstance(part, Wheel)]
         if direct and form.port_road is not None:
-            slopes, _ = Ports(own).stiffness_and_damping(jnp.zeros(len(own)))
+            slopes, _ = Ports(together).stiffness_and_damping(jnp.zeros(len(together)))
             loads = loads - form.port_road[np.array(direct)].T @ (slopes * (form.ports @ deflected))[np.array(direct)]
         return loads
 

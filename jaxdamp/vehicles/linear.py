@@ -305,9 +305,9 @@ def with_weightings(linear: LinearVehicle, weightings: Sequence[tuple[str, str]]
     size, inner = linear.state_matrix.shape[0], sum(f.input_vector.size for f in filters)
     into = jax.scipy.linalg.block_diag(*[f.input_vector[:, None] for f in filters])
     out = jax.scipy.linalg.block_diag(*[f.output_vector[None, :] for f in filters])
-    own = jax.scipy.linalg.block_diag(*[f.state_matrix for f in filters])
+    filter_states = jax.scipy.linalg.block_diag(*[f.state_matrix for f in filters])
     above = jnp.concatenate([linear.state_matrix, jnp.zeros((size, inner))], axis=1)
-    below = jnp.concatenate([into @ linear.output[picked], own], axis=1)
+    below = jnp.concatenate([into @ linear.output[picked], filter_states], axis=1)
     unweighted = jnp.concatenate([linear.output, jnp.zeros((len(linear.channels), inner))], axis=1)
     weighted = jnp.concatenate([jnp.zeros((len(filters), size)), out], axis=1)
     wheels = linear.road_input.shape[1]

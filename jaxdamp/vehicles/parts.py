@@ -267,8 +267,8 @@ class Wheel(AbstractPart):
     @property
     def element_names(self) -> tuple[str, ...]:
         """Names of the elements between it and the road, with that of a tyre that can leave it."""
-        own = [element.name for element in self.elements] + ["lift_off"] * self.lifts
-        return tuple(prefixed(self.name, name) for name in own)
+        names = [element.name for element in self.elements] + ["lift_off"] * self.lifts
+        return tuple(prefixed(self.name, name) for name in names)
 
 
 @final

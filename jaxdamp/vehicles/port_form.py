@@ -154,10 +154,10 @@ class Ports(eqx.Module):
             if len(kind) == 1:
                 results.append(call(law, *[vector[kind[0]] for vector in vectors], *state))
                 continue
-            arrays, rest = eqx.partition(law, eqx.is_array)
+            arrays, static = eqx.partition(law, eqx.is_array)
             picked = [_pick(vector, kind) for vector in vectors]
             results.append(
-                jax.vmap(lambda a, *more, rest=rest: call(eqx.combine(a, rest), *more))(arrays, *picked, *state)
+                jax.vmap(lambda a, *more, static=static: call(eqx.combine(a, static), *more))(arrays, *picked, *state)
             )
         return results
 

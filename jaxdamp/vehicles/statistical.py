@@ -167,9 +167,9 @@ def _kinds(laws: Sequence[AbstractDamper], curved: Sequence[tuple[int, ...]], ps
         count = laws[members[0]].initial_state().size
         inner = begun + np.arange(len(members) * count).reshape(len(members), count)
         begun += inner.size
-        own = np.array(members)[:, None]
-        motions = np.concatenate([len(laws) + own, own, 2 * len(laws) + inner], axis=1)
-        answers = np.concatenate([own, len(laws) + inner], axis=1)
+        members_column = np.array(members)[:, None]
+        motions = np.concatenate([len(laws) + members_column, members_column, 2 * len(laws) + inner], axis=1)
+        answers = np.concatenate([members_column, len(laws) + inner], axis=1)
         scale = _scales(law, len(members), curved[members[0]], fast)
         kinds.append(_Kind(law, curved[members[0]], motions, answers, scale))
     return kinds
@@ -179,8 +179,8 @@ def _each(function: Callable[..., PyTree], law: AbstractDamper, count: int, *row
     """The function of each law, with its row of each array."""
     if count == 1:
         return jax.tree.map(lambda leaf: leaf[None], function(law, *jax.tree.map(lambda leaf: leaf[0], rows)))
-    arrays, rest = eqx.partition(law, eqx.is_array)
-    return jax.vmap(lambda arrays, *rows: function(eqx.combine(arrays, rest), *rows))(arrays, *rows)
+    arrays, static = eqx.partition(law, eqx.is_array)
+    return jax.vmap(lambda arrays, *rows: function(eqx.combine(arrays, static), *rows))(arrays, *rows)
 
 
 def _scales(law: AbstractDamper, count: int, curved: tuple[int, ...], fast: Scalar) -> Float[Array, "laws variables"]:
@@ -205,10 +205,10 @@ def _scales(law: AbstractDamper, count: int, curved: tuple[int, ...], fast: Scal
 
 def _first(system: System, kinds: Sequence[_Kind], owners: Sequence[int]) -> list[Spread]:
     """Where the search begins: with the vehicle at rest and no correlations."""
-    rest = rest_position(system, jnp.zeros(system.form.road_stiffness.shape[1]))
-    rest = jnp.where(jnp.isfinite(rest), rest, 0.0)
+    at_rest = rest_position(system, jnp.zeros(system.form.road_stiffness.shape[1]))
+    at_rest = jnp.where(jnp.isfinite(at_rest), at_rest, 0.0)
     states = sum(kind.answers.shape[1] - 1 for kind in kinds for _ in kind.answers)
-    place = jnp.concatenate([rest, jnp.zeros(rest.size + states)])
+    place = jnp.concatenate([at_rest, jnp.zeros(at_rest.size + states)])
     means = motions_of(system, owners, states).state @ place
     pairs = [len(kind.curved) * (len(kind.curved) - 1) // 2 for kind in kinds]
     return [
@@ -232,12 +232,12 @@ def _nearest(kinds: Sequence[_Kind], spreads: Sequence[Spread], owners: tuple[in
         ) -> tuple[Array, Array]:
             return _nearest_of_one(law, curved, spread, scale)
 
-        own, own_slopes = _each(of_one, kind.law, len(kind.answers), spread, kind.scale)
+        constants, own_slopes = _each(of_one, kind.law, len(kind.answers), spread, kind.scale)
         rows, columns = (
-            np.eye(answers, dtype=own.dtype)[kind.answers],
-            np.eye(slopes.shape[1], dtype=own.dtype)[kind.motions],
+            np.eye(answers, dtype=constants.dtype)[kind.answers],
+            np.eye(slopes.shape[1], dtype=constants.dtype)[kind.motions],
         )
-        constant += jnp.tensordot(own, rows, 2)
+        constant += jnp.tensordot(constants, rows, 2)
         slopes += jnp.tensordot(jnp.swapaxes(own_slopes @ columns, 1, 2), rows, ((0, 2), (0, 1))).T
     return LinearLaws(constant, slopes, owners)
 
@@ -296,12 +296,12 @@ def _distributions(
     means, spreads = moved.state @ rest, []
     for kind in kinds:
         chosen, size = _chosen(kind), len(kind.curved)
-        own = covariance[chosen[:, :, None], chosen[:, None, :]]
-        variance = jnp.diagonal(own, axis1=1, axis2=2) + (_SMALLEST * kind.scale) ** 2
+        covariances = covariance[chosen[:, :, None], chosen[:, None, :]]
+        variance = jnp.diagonal(covariances, axis1=1, axis2=2) + (_SMALLEST * kind.scale) ** 2
         log_deviation = 0.5 * jnp.log(at_least(variance, (_SMALLEST * kind.scale) ** 2))
         deviation = jnp.exp(log_deviation)
         row, column = np.tril_indices(size, -1)
-        correlation = own[:, row, column] / (deviation[:, row] * deviation[:, column])
+        correlation = covariances[:, row, column] / (deviation[:, row] * deviation[:, column])
         tilt = jnp.arctanh(within(correlation, -_STRAIGHT, _STRAIGHT))
         spreads.append(Spread(log_deviation, tilt, means[chosen] / kind.scale))
     return spreads
@@ -312,13 +312,13 @@ def _fixed_point(function: Callable[[Array, PyTree], Array], start: Array, argum
 
     Derivatives by the arguments follow from the implicit function theorem, of any order and in both modes.
     """
-    differentiable, rest = eqx.partition(arguments, eqx.is_inexact_array)
+    differentiable, static = eqx.partition(arguments, eqx.is_inexact_array)
 
     def slope(y: Array, differentiable: object) -> tuple[Array, Array]:
         """1 − ∂function/∂y, and what is missing."""
 
         def at(y: Array) -> tuple[Array, Array]:
-            value = function(y, eqx.combine(differentiable, rest))
+            value = function(y, eqx.combine(differentiable, static))
             return value, value
 
         slopes, value = jax.jacfwd(at, has_aux=True)(y)
@@ -339,7 +339,7 @@ def _fixed_point(function: Callable[[Array, PyTree], Array], start: Array, argum
     ) -> tuple[tuple[Array, Scalar], tuple[Array, Scalar]]:
         y, converged = solution(*primals)
         (_, now), (_, moved) = primals, tangents
-        _, change = jax.jvp(lambda d: function(y, eqx.combine(d, rest)), (now,), (moved,))
+        _, change = jax.jvp(lambda d: function(y, eqx.combine(d, static)), (now,), (moved,))
         return (y, converged), (solve(slope(y, now)[0], change), jnp.zeros_like(converged))
 
     solution.defjvp(rule)

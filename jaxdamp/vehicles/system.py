@@ -48,8 +48,8 @@ class Layout:
         """The common part of the wheel names of each axle, or the number of the axle."""
         words: dict[int, list[str]] = {}
         for axle, wheel in zip(self.axles, self.wheels, strict=True):
-            own = wheel.split("_")
-            pairs = zip(words.get(axle, own), own, strict=False)
+            parts = wheel.split("_")
+            pairs = zip(words.get(axle, parts), parts, strict=False)
             words[axle] = [word for word, _ in itertools.takewhile(lambda pair: pair[0] == pair[1], pairs)]
         return tuple("_".join(common) or f"number {axle + 1}" for axle, common in words.items())
 
@@ -151,12 +151,17 @@ def _outputs(
     """The channels, from their linear combinations of signals and the accelerations of the coordinates."""
     n, ports, wheels = len(layout.coordinates), len(layout.ports), len(layout.wheels)
     relative = [c.kind is ChannelKind.RELATIVE_TYRE_LOAD for c in layout.channels]
-    divisor = [1 + layout.wheels.index(c.place) if own else 0 for c, own in zip(layout.channels, relative, strict=True)]
+    divisor = [
+        1 + layout.wheels.index(c.place) if is_relative else 0
+        for c, is_relative in zip(layout.channels, relative, strict=True)
+    ]
     shares = jnp.concatenate([jnp.ones(1), 1.0 / loads])[np.array(divisor)]
     ends = np.cumsum([2 * n, n, ports, wheels])
     of_motion, of_acceleration, *others = jnp.split(sums * shares[:, None], ends, axis=1)
     accelerations = (part[n:] for part in (motion.motion, motion.force, motion.road, motion.road_rate))
-    return LinearMap(*(own + of_acceleration @ by for own, by in zip((of_motion, *others), accelerations, strict=True)))
+    return LinearMap(
+        *(direct + of_acceleration @ by for direct, by in zip((of_motion, *others), accelerations, strict=True))
+    )
 
 
 @final
