@@ -238,9 +238,9 @@ def _of_power(unit: str) -> str:
 
 def _of_dose(unit: str) -> str:
     """The unit times s^0.25."""
-    for per_time, root in (("/s^2", "/s^1.75"), ("/s", "/s^0.75")):
+    for per_time, of_dose in (("/s^2", "/s^1.75"), ("/s", "/s^0.75")):
         if unit.endswith(per_time):
-            return unit.removesuffix(per_time) + root
+            return unit.removesuffix(per_time) + of_dose
     return f"{unit} s^0.25".strip()
 
 
