@@ -101,7 +101,7 @@ def brief(name: str) -> str:
     """A name that leaves room for the picture: without the middle of a long one, as files often differ at the end.
 
     >>> brief("front damper"), brief("front damper of the second prototype, cold, 2.5Hz")
-    ('front damper', 'front damper of the…type, cold, 2.5Hz')
+    ('front damper', 'front damper of the…ype, cold, 2.5Hz')
     """
     return name if len(name) <= _LONGEST else f"{name[: _LONGEST - _END - 1].rstrip()}…{name[-_END:].lstrip()}"
 
