@@ -111,7 +111,7 @@ class Controlled(AbstractVehicle):
                 _checks.one_of("policy", name, forces)
                 _checks.instance(f"policy[{name!r}]", policy, AbstractPolicy, "be a policy", such)
         dampers, policy = self.commanded(list(forces))
-        _refuse_scaled(self.car.frame(), dampers)
+        refuse_scaled(self.car.frame(), dampers)
         policy.sampled(self.period).initial_state(dampers)  # refuses what does not suit the vehicle or the period
         each = self.sensors if isinstance(self.sensors, dict) else {}
         for name in each:
@@ -161,7 +161,7 @@ class Controlled(AbstractVehicle):
         return _controlled_system(self, self.layout)
 
 
-def _refuse_scaled(frame: Frame, dampers: Sequence[str]) -> None:
+def refuse_scaled(frame: Frame, dampers: Sequence[str]) -> None:
     """Refuse dampers between scaled points: signals are heights of body and wheel, whose difference is the stroke."""
     heights = {f"z_{body.name}" for body in frame.bodies}
     for name in dampers:

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
-from jaxdamp.control.controlled import rows_of
+from jaxdamp.control.controlled import refuse_scaled, rows_of
 from jaxdamp.control.levels import takes_command
 from jaxdamp.control.policies import StateFeedback
 from jaxdamp.control.together import VehicleFeedback
@@ -32,7 +32,7 @@ def lqr(car: AbstractVehicle, *, stroke: float = 2e3, tyre: float = 1e4) -> Stat
         tyre: weight q_d of the deflection of each tyre [m], in 1/s⁴.
 
     Raises:
-        ValueError: another vehicle; a weight that is not positive.
+        ValueError: another vehicle; a damper between scaled points; a weight that is not positive.
 
     Source: Hrovat, Survey of advanced suspension developments and related optimal control applications, Automatica 33
     (1997) 1781-1817.
@@ -71,6 +71,7 @@ def state_space(car: AbstractVehicle) -> tuple[np.ndarray, np.ndarray, np.ndarra
     _checks.instance("car", car, AbstractVehicle, "be a vehicle", "Put the damper into one.")
     system, frame = car.system(), car.frame()
     taking = [i for i, law in enumerate(system.laws) if takes_command(law)]
+    refuse_scaled(frame, [system.layout.ports[i] for i in taking])
     form, n = system.form, len(taking)
     body, _, _, wheel, _ = (np.asarray(part) for part in rows_of(frame, form.ports[np.array(taking, dtype=int)]))
     moves, stretches = np.concatenate([body, wheel]), np.concatenate([body - wheel, wheel])

@@ -20,6 +20,7 @@ from jaxdamp.control import (
     PowerDriven,
     Skyhook,
     StateFeedback,
+    lqr,
 )
 from jaxdamp.dampers import AbstractDamper, Bilinear, BoucWen, Lag, Linear, LuGre, MotionRatio, Scheduled, SeriesSpring
 from jaxdamp.vehicles import Body, Corner, Element, Frame, HalfCar, Link, QuarterCar, Seat, SeatMass, Wheel
@@ -302,6 +303,7 @@ def test_single_precision_drives_too(car):
         (lambda: Controlled(quarter(Lag(DAMPER, 0.01)), Skyhook()), "`damper` must have a force that changes at once"),
         (lambda: Controlled(quarter(SPRUNG), Skyhook()), "Blend the forces of its levels"),
         (lambda: Controlled(_lever(0.7), Skyhook()), "`damper` must have the difference .* 0.7 times"),
+        (lambda: lqr(_lever(0.7)), "`damper` must have the difference .* 0.7 times"),
         (lambda: Controlled(quarter(), {"rear_damper": Skyhook()}), "`policy` must be one of 'damper'"),
         (
             lambda: Controlled(quarter(), {"damper": cast("AbstractPolicy", 3000.0)}),
