@@ -309,8 +309,8 @@ def _where_it_holds(road: Road | Scenarios, fresh_roads: int) -> str:
     scenarios = road.in_words if isinstance(road, Scenarios) else ""
     if is_white(road):
         return scenarios or "in the mean of all such roads"
-    others = "which cannot be drawn again" if fresh_roads else "tried on no other"
-    return f"{scenarios or 'on the road of the tuning'}, {others}"
+    others = "not random: there are no fresh roads" if fresh_roads else "tried on no other"
+    return f"{scenarios or 'on the road of the tuning'} ({others})"
 
 
 def _in_scenarios(task: DesignTask[AbstractVehicle], tuned: AbstractVehicle) -> ScenarioValues | None:
