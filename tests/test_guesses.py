@@ -36,6 +36,8 @@ def test_what_a_class_does_not_have() -> None:
         _ = dampers.Table.from_csv
     with pytest.raises(AttributeError, match=r"velocity_histogram\(response"):
         _ = Response.histogram
+    with pytest.raises(AttributeError, match=r"rig.quasi_static\(law, velocities\).force"):
+        _ = dampers.Sum.force_velocity
     for name in ("estimate", "propagate", "profile", "posterior", "band"):
         with pytest.raises(AttributeError, match=rf"{name}'; did you mean that of `identify.fit\(training.law, tr"):
             getattr(identify.Training, name)

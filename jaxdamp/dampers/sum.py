@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array
 
 from jaxdamp import _checks
+from jaxdamp._guesses import Elsewhere
 from jaxdamp._traced import behind
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp._vectors import joined
@@ -63,6 +64,7 @@ class Sum(AbstractDamper):
     """
 
     terms: tuple[AbstractDamper, ...]
+    force_velocity = Elsewhere("`jaxdamp.rig.quasi_static(law, velocities).force`, as terms may have states")
 
     def __check_init__(self) -> None:
         if not self.terms:
