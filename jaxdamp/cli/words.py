@@ -33,15 +33,15 @@ def pairs(option: str, texts: Sequence[str], like: str = "NAME=VALUE") -> list[t
     >>> pairs("columns", ["time=t,stroke=LVDT, FL"])
     [('time', 't'), ('stroke', 'LVDT, FL')]
     """
-    pairs: list[tuple[str, str]] = []
+    named_texts: list[tuple[str, str]] = []
     for part in (part.strip() for text in texts for part in re.split(r",(?=\s*[^\s,=:]+\s*=)", text)):
         name, equals, value = (piece.strip() for piece in part.partition("="))
         if not equals or not name or not value:
             _checks.refuse(option, f"read like {like}", repr(part))
-        if name in (earlier for earlier, _ in pairs):
+        if name in (earlier for earlier, _ in named_texts):
             _checks.refuse(option, "name each thing once", f"twice {name!r}")
-        pairs.append((name, value))
-    return pairs
+        named_texts.append((name, value))
+    return named_texts
 
 
 def column(text: str) -> str | int | None:
@@ -184,10 +184,10 @@ def bound(text: str) -> tuple[Bound, Bound]:
     >>> bound("1000:4000"), bound("5 lbf s/in:25 lbf s/in"), bound("3")
     ((1000.0, 4000.0), ('5 lbf s/in', '25 lbf s/in'), (None, 3.0))
     """
-    span = limit(text)
-    if span is None or "%" in text:
+    ends = limit(text)
+    if ends is None or "%" in text:
         raise ValueError(text)
-    return span if isinstance(span, tuple) else (None, span)
+    return ends if isinstance(ends, tuple) else (None, ends)
 
 
 def _end(text: str, with_unit: bool) -> Bound:
@@ -220,11 +220,11 @@ def axis(text: str) -> Axis:
 def axes(option: str, given: Sequence[str]) -> dict[str, Axis]:
     """The axes of a sweep by parameter, each of one value or more."""
     must = "read like NAME=FIRST:LAST:COUNT or NAME=A;B;C, each with its unit or all in SI"
-    axes = named(axis, must)(option, given)
-    for name, (values, _) in axes.items():
+    grid = named(axis, must)(option, given)
+    for name, (values, _) in grid.items():
         if not values.size:
             _checks.refuse(option, "have one value or more on each axis", name)
-    return axes
+    return grid
 
 
 def named_numbers(defaults: Mapping[str, float | None], example: str) -> Callable[[str, Sequence[str]], list[Named]]:

@@ -58,6 +58,11 @@ def law_numbers(law: eqx.Module) -> list[LawNumber]:
             kind = "command" if declared.get("command") else "setting" if "setting" in field.metadata else "parameter"
             about = declared["unit"], declared["meaning"], domain
             numbers.append(LawNumber(path, identifier(path), *about, np.asarray(value, float), kind))
+    by_name: dict[str, str] = {}
+    for number in numbers:
+        if (other := by_name.setdefault(number.name, number.path)) != number.path:
+            must = "have parameters whose names differ in their ASCII letters, as those of C do"
+            _checks.refuse("law", must, f"one with {other} and {number.path}", "Give one of them another name.")
     return numbers
 
 
@@ -68,16 +73,24 @@ def _conditions(model: eqx.Module) -> list[tuple[str, AbstractDamper, Any]]:
 
 
 def identifier(path: str) -> str:
-    """A path, a class or the name of a file as an identifier; letters lose their accents.
+    """A path, a class or the name of a file as an identifier; letters lose their accents, Greek ones are spelled.
 
     >>> identifier("law.terms.0.rate"), identifier("default"), identifier("Dämpfer 2"), identifier("減衰")
     ('law_terms_0_rate', 'default_', 'Dampfer_2', 'law')
+    >>> identifier("law.η"), identifier("Ω_max")
+    ('law_eta', 'Omega_max')
     """
-    plain = "".join(c for c in unicodedata.normalize("NFKD", path) if not unicodedata.combining(c))
-    name = re.sub(r"\W", "_", plain, flags=re.ASCII)
+    plain = (c for c in unicodedata.normalize("NFKD", path) if not unicodedata.combining(c))
+    name = re.sub(r"\W", "_", "".join(map(_spelled, plain)), flags=re.ASCII)
     if not name.strip("_") and name != path:
         return "law"
     return f"{name}_" if name in _RESERVED or not name else f"_{name}" if name[0].isdigit() else name
+
+
+def _spelled(letter: str) -> str:
+    """The name of a Greek letter; any other as it is."""
+    greek = re.fullmatch(r"GREEK (SMALL|CAPITAL) LETTER.* (\w+)", unicodedata.name(letter, ""))
+    return letter if greek is None else greek[2].lower() if greek[1] == "SMALL" else greek[2].title()
 
 
 class AbstractProgram:

@@ -114,7 +114,7 @@ def _of_numbers(program: AnyProgram) -> Iterator[Variable]:
             yield Variable(in_fmi(number.path) + place, number.unit, about, float(number.value[index]), ends)
 
 
-def description(program: AnyProgram, variables: list[Variable], name: str, guid: str) -> str:
+def description(program: AnyProgram, members: list[Variable], name: str, guid: str) -> str:
     """The model description as XML; what is sampled is for co-simulation only."""
     model = program.law if isinstance(program, LawProgram) else program.vehicle
     root = ET.Element(
@@ -134,10 +134,10 @@ def description(program: AnyProgram, variables: list[Variable], name: str, guid:
         files = ET.SubElement(ET.SubElement(root, kind, {"modelIdentifier": name} | can | more), "SourceFiles")
         ET.SubElement(files, "File", {"name": f"{name}.c"})
     step = program.vehicle.period if isinstance(program, ControllerProgram) else LONGEST_STEP
-    _units(ET.SubElement(root, "UnitDefinitions"), {variable.unit for variable in variables} - {""})
+    _units(ET.SubElement(root, "UnitDefinitions"), {variable.unit for variable in members} - {""})
     ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize=repr(step))
     listed = ET.SubElement(root, "ModelVariables")
-    for place, variable in enumerate(variables):
+    for place, variable in enumerate(members):
         attributes = {"name": variable.name, "valueReference": str(place)} | variable.about
         scalar = ET.SubElement(listed, "ScalarVariable", attributes)
         real = ET.SubElement(scalar, "Real", {"unit": variable.unit} if variable.unit else {})
@@ -145,17 +145,17 @@ def description(program: AnyProgram, variables: list[Variable], name: str, guid:
         numbers = {key: end for key, end in ends if abs(end) < GREATEST} | {"start": variable.start}
         numbers |= {"derivative": None if variable.derivative_of is None else variable.derivative_of + 1}
         real.attrib |= {key: repr(value) for key, value in numbers.items() if value is not None}
-    _structure(ET.SubElement(root, "ModelStructure"), variables)
+    _structure(ET.SubElement(root, "ModelStructure"), members)
     ET.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 
 
-def _structure(structure: ET.Element, variables: list[Variable]) -> None:
+def _structure(structure: ET.Element, members: list[Variable]) -> None:
     """Outputs, derivatives and what is computed at the start, by places counted from one."""
-    about = [variable.about for variable in variables]
+    about = [variable.about for variable in members]
     lists = {
         "Outputs": [k for k, a in enumerate(about) if a["causality"] == "output"],
-        "Derivatives": [k for k, variable in enumerate(variables) if variable.derivative_of is not None],
+        "Derivatives": [k for k, variable in enumerate(members) if variable.derivative_of is not None],
         "InitialUnknowns": [k for k, a in enumerate(about) if a.get("initial") == "calculated"],
     }
     for name, places in lists.items():
@@ -252,7 +252,7 @@ def to_fmu(
     return write_whole(file, _archive(contents))
 
 
-def _printed(program: AnyProgram, variables: list[Variable]) -> tuple[str, str]:
+def _printed(program: AnyProgram, members: list[Variable]) -> tuple[str, str]:
     """The file of this kind of model, and the functions and tables that it uses."""
     if isinstance(program, LawProgram):
         code, source = "law.c", law_source(program, "model", ("force", "state_rate"))
@@ -261,7 +261,7 @@ def _printed(program: AnyProgram, variables: list[Variable]) -> tuple[str, str]:
     else:
         code, source = "vehicle.c", vehicle_source(program, "model", not program.sampled)
     functions = source._replace(functions=[*source.functions, *margins(program)]).static()
-    outputs = [variable.name for variable in variables if variable.about["causality"] == "output"]
+    outputs = [variable.name for variable in members if variable.about["causality"] == "output"]
     return code, functions + tables(program, [variable.name for variable in _of_numbers(program)], outputs)
 
 

@@ -325,11 +325,11 @@ def _compared(
     limits: MachineLimits | None,
 ) -> ExperimentDesign:
     """The design beside a programme of tests."""
-    information = informed(programme)
-    each = zip(programme, information.force, information.power, strict=True)
+    gained = informed(programme)
+    each = zip(programme, gained.force, gained.power, strict=True)
     over = [words for test, force, power in each if (words := beyond(test, limits, force, power))]
     notes = [f"The machine cannot run {len(over)} of the {len(programme)} tests of the programme: {listed(over)}."]
-    of_programme = information.matrices.sum(axis=0)
+    of_programme = gained.matrices.sum(axis=0)
     aim = float(goal.value(of_programme))
     longest = goal.added(chosen, max(len(programme) - len(chosen), 0), pool.matrices)
     reached = goal.value(np.cumsum(pool.matrices[longest[: len(programme)]], axis=0)) <= aim

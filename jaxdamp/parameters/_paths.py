@@ -167,17 +167,15 @@ def _may_name_commands(name: str) -> bool:
     return "*" not in name.rpartition(".")[2]
 
 
-def match_parameters(parameters: Sequence[Parameter], names: Sequence[str]) -> list[str]:
+def match_parameters(every: Sequence[Parameter], names: Sequence[str]) -> list[str]:
     """The paths that names and patterns stand for (`match_paths`), those of commands only by their own name.
 
     Arguments:
-        parameters: of `named_parameters`.
+        every: of `named_parameters`.
         names: names and patterns.
     """
-    hits = [
-        match_paths([p.path for p in parameters if not p.command or _may_name_commands(name)], [name]) for name in names
-    ]
-    return [p.path for p in parameters if any(p.path in paths for paths in hits)]
+    hits = [match_paths([p.path for p in every if not p.command or _may_name_commands(name)], [name]) for name in names]
+    return [p.path for p in every if any(p.path in paths for paths in hits)]
 
 
 def match_paths(paths: Sequence[str], patterns: Sequence[str]) -> list[str]:

@@ -48,8 +48,8 @@ def coherency(
     _checks.positive("track_width", track_width)
     _checks.positive("waviness", waviness, "The standard uses 2.")
     n = jnp.asarray(spatial_frequency, float)
-    coherency = _coherency(n.ravel(), jnp.asarray(track_width, float), jnp.asarray(waviness, float))
-    return coherency.reshape(n.shape)
+    shared = _coherency(n.ravel(), jnp.asarray(track_width, float), jnp.asarray(waviness, float))
+    return shared.reshape(n.shape)
 
 
 @jax.jit

@@ -34,12 +34,12 @@ def deliveries(channel: Callable[[str], Signal], dampers: Sequence[str]) -> dict
         channel: the values of a channel by its name.
         dampers: names of those under control.
     """
-    deliveries = {}
+    by_damper = {}
     for name in dampers:
         demand, force, rate = (np.asarray(channel(f"{name}_{word}")) for word in ("demand", "force", "velocity"))
         share = np.mean(force * demand) / np.mean(demand**2) if np.any(demand) else 1.0
-        deliveries[name] = Delivery(float(share), float(np.mean(demand * rate >= 0.0)))
-    return deliveries
+        by_damper[name] = Delivery(float(share), float(np.mean(demand * rate >= 0.0)))
+    return by_damper
 
 
 FAR = 0.01  # share of the time outside the fitted range from which a verdict cannot be trusted

@@ -169,7 +169,7 @@ def random_motions() -> tuple[float, np.ndarray, np.ndarray]:
 
 def knees(law: AbstractDamper) -> np.ndarray:
     """Zero and all velocities [m/s] among the numbers of a law and of the laws inside, and divided by motion ratios."""
-    knees, modules = [0.0], [law]
+    places, modules = [0.0], [law]
     ratios = [float(r) for p in parameters(law) if p.path.endswith("ratio") for r in np.ravel(p.value)]
     while modules:
         module = modules.pop()
@@ -180,7 +180,7 @@ def knees(law: AbstractDamper) -> np.ndarray:
                 declared = field.metadata.get("parameter") or field.metadata.get("setting") or {}
                 value = getattr(module, name)
                 if declared.get("unit") == "m/s":
-                    knees += np.ravel(value).tolist()
+                    places += np.ravel(value).tolist()
                 modules.append(value)
-    both = np.array([*knees, *(-a for a in knees)])
+    both = np.array([*places, *(-a for a in places)])
     return np.unique(np.concatenate([both, *(both / r for r in ratios)]))

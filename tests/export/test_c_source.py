@@ -21,7 +21,7 @@ from jaxdamp.dampers import (
 from jaxdamp.export import to_c
 from jaxdamp.export._c_text import numbered
 from jaxdamp.export._controller_program import Line
-from jaxdamp.export._law_program import identifier
+from jaxdamp.export._law_program import identifier, law_numbers
 from jaxdamp.parameters import parameter
 from jaxdamp.simulation import substeps_needed
 from jaxdamp.vehicles.presets import quarter_car_000
@@ -115,6 +115,16 @@ class Sorted(AbstractMemoryless):
         return jax.numpy.sort(jax.numpy.stack([self.rate * v, 2.0 * self.rate * v]))[0]
 
 
+class Accented(Sorted):
+    dämpfung: Number = parameter("N s/m", "with an accent")
+    dampfung: Number = parameter("N s/m", "without")
+
+
+class Greek(Sorted):
+    μ: Number = parameter("N s/m", "of the velocity")
+    η: Number = parameter("N s²/m²", "of its square")
+
+
 def test_the_header_of_a_vehicle_states_the_longest_step(tmp_path):
     """Steps as long as those of the instants are too long for steep friction, which `simulate` divides by itself."""
     steep = quarter_car_000(Linear(2000.0) + CoulombFriction(400.0, 4e-4))
@@ -140,6 +150,9 @@ def test_names_that_are_one_in_c_are_refused_and_comments_are_closed():
     for name in ("F_stroke", "front-axle_stroke"):
         with pytest.raises(ValueError, match=f"names that differ in C, .* but is one with '.*' and '{name}'. Rename"):
             numbered("CAR_Y", [*lines, Line(name, "m", "")])
+    with pytest.raises(ValueError, match=r"differ in their ASCII letters, .* one with dämpfung and dampfung"):
+        law_numbers(Accented(1.0, 2.0, 3.0))
+    assert [number.name for number in law_numbers(Greek(1.0, 2.0, 3.0))] == ["rate", "mu", "eta"]
 
 
 def test_refusals(tmp_path):

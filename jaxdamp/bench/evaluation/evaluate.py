@@ -165,12 +165,12 @@ def _not_reached(
     low, high, where = forces.span(measurements)
     if velocities is not None:
         return [f"No force at {v:.4g} m/s: {where}." for v in missed], []
-    measured, instead = list[Measurement](), "Add records of other velocities."
+    at_velocities, instead = list[Measurement](), "Add records of other velocities."
     if low < high or forces.method == "loop":
         digits = 1 - int(np.floor(np.log10(high)))
         velocity = max(float(np.floor(high * 10.0**digits) / 10.0**digits), low)
         instead = f"Forces are stated at {velocity:.4g} m/s."
         for name in forces.settings:
-            measured += forces.at([velocity], name, measurements)
+            at_velocities += forces.at([velocity], name, measurements)
     usual = f"None of the usual velocities, from {curve.OEM_VELOCITIES[0]:g} m/s on, is reached"
-    return [f"{usual}: {where}. {instead}"], measured
+    return [f"{usual}: {where}. {instead}"], at_velocities

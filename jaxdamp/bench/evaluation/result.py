@@ -173,8 +173,8 @@ class Evaluation(AbstractResult):
         forces = Forces(self.settings, self.cycles, self.method, self.window)
         wanted = dict.fromkeys(limit.velocity for limit in limits if limit.velocity is not None)
         for name in self.settings:
-            measured = [m for m in self.measurements if m.setting == name]
-            missing = [velocity for velocity in wanted if not any(at_velocity(m, velocity) for m in measured)]
+            of_setting = [m for m in self.measurements if m.setting == name]
+            missing = [velocity for velocity in wanted if not any(at_velocity(m, velocity) for m in of_setting)]
             measurements += forces.at(missing, name, self.measurements)
         return LimitCheck.of(measurements, limits, forces.span(self.measurements)[2])
 
