@@ -47,7 +47,7 @@ class Spectrum(NamedTuple):
 def spectrum_of(time: Samples, stroke: Samples, frequency: float) -> Spectrum:
     """Tells motion, slow and fast, from ripple and noise; see the text of this module."""
     count, rate = len(stroke), (len(time) - 1) / (time[-1] - time[0])
-    power = np.abs(np.fft.rfft((stroke - np.mean(stroke)) * np.hanning(count))) ** 2
+    power = np.abs(np.fft.rfft((stroke - np.mean(stroke)) * _taper(count, round(rate / frequency)))) ** 2
     frequencies = np.fft.rfftfreq(count, 1 / rate)
     floor = float(np.median(power[len(power) // 2 :])) / np.log(2)
     seen, slow = power > 10 * floor, frequencies < _SLOW * frequency
@@ -66,6 +66,13 @@ def spectrum_of(time: Samples, stroke: Samples, frequency: float) -> Spectrum:
     return Spectrum(
         rate, _SLOW * frequency, 2 * np.pi / rate * frequencies, power, floor, seen, motion, has_fast_motion
     )
+
+
+def _taper(count: int, cycle: int) -> Samples:
+    """Rises and falls within a cycle, so that the fast end of a sweep counts like the middle of the record."""
+    ends = np.hanning(2 * min(max(cycle, 1), count // 2))
+    rise, fall = np.split(ends, 2)
+    return np.concatenate([rise, np.ones(count - len(ends)), fall])
 
 
 def _repeating(time: Samples, stroke: Samples) -> tuple[float, float]:

@@ -186,7 +186,16 @@ def _slow_and_a_little_fast(t):
     return x, w * (0.01 * np.cos(0.5 * w * t) + 0.008 * np.cos(20 * w * t))
 
 
-@pytest.mark.parametrize("motion", [_slow_and_fast, _slow_and_a_little_fast, _wide_band, _rounded_triangle])
+def _sweep(t):
+    """0.25 to 25 Hz of constant speed within a stroke: the fast end is a small part of the stroke, at the end alone."""
+    growth = np.log(100.0) / 8.0
+    rate = 0.5 * np.pi * np.exp(growth * t)
+    phase, size = (rate - rate[0]) / growth, np.minimum(0.05, 0.3 / rate)
+    v = size * rate * np.cos(phase) - np.where(size < 0.05, size * growth * np.sin(phase), 0.0)
+    return size * np.sin(phase), v
+
+
+@pytest.mark.parametrize("motion", [_sweep, _slow_and_fast, _slow_and_a_little_fast, _wide_band, _rounded_triangle])
 @pytest.mark.parametrize("noise", [0.0, 2e-6])
 def test_fast_motion_is_no_noise(motion, noise, rng):
     """Above ten times the frequency of the motion too: the velocity was up to 85 % wrong."""
