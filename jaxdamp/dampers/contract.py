@@ -56,7 +56,8 @@ class Traits(NamedTuple):
 
     def scaled_along_stroke(self) -> "Traits":
         """Those of the force times a factor of the stroke: at rest it changes with the stroke, even if constant."""
-        at_rest = self.stroke_dependent_at_rest or self.contains_offset
+        constant = self.contains_offset or self.temperature_dependent  # heat holds one (`Heated.static_force_slope`)
+        at_rest = self.stroke_dependent_at_rest or constant
         return self._replace(stroke_dependent=True, stroke_dependent_at_rest=at_rest)
 
 

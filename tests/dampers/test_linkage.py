@@ -11,6 +11,7 @@ from scipy.optimize import root_scalar
 from jaxdamp import respond, roads, simulate
 from jaxdamp.dampers import (
     BoucWen,
+    Heated,
     Lag,
     Linear,
     Linkage,
@@ -25,7 +26,7 @@ from jaxdamp.dampers import (
 from jaxdamp.dampers.fitted_range import Motion
 from jaxdamp.parameters import replace
 from jaxdamp.simulation import substeps_needed
-from jaxdamp.vehicles import Axle, Corner, FullCar, HalfCar, QuarterCar, linearise
+from jaxdamp.vehicles import Axle, Corner, FullCar, HalfCar, QuarterCar, linearise, static_equilibrium
 
 
 TRAVEL, RATIO = np.array([-0.08, -0.03, 0.01, 0.06]), np.array([0.92, 0.85, 0.7, 0.55])
@@ -186,6 +187,9 @@ def test_a_force_at_rest_moves_with_the_ratio():
     rest = simulate(QuarterCar(300.0, 40.0, 20e3, 180e3, law), FLAT, duration=0.01)
     x = float(rest["stroke"][0])
     np.testing.assert_allclose(20e3 * x, 300.0 * ratio_by_hand(x), rtol=1e-9)
+    warm = Heated(Linear(1500.0), static_force_slope=-5.0, initial_rise=60.0)  # its gas pushes with 300 N
+    position = static_equilibrium(QuarterCar(300.0, 40.0, 20e3, 180e3, Linkage(warm, TRAVEL, RATIO)))
+    assert float(position["z_sprung"] - position["z_unsprung"]) == pytest.approx(x, rel=1e-9)
 
 
 @pytest.mark.slow
