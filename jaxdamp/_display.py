@@ -46,6 +46,7 @@ _AMOUNT = re.compile(
     rf"(?<![\w.])((?:{_NUMBER}, )*)({_NUMBER})(?:( to | … | ± )({_NUMBER}))?([ \xa0])"
     r"(N s/m|N/mm|N/m|mm/s|m/s|mm|kN|kg|N|m|J)(?![\w²³^/·]| [ms]\b)"
 )
+_READ = {"m": (1e3, "mm"), "N/m": (1e-3, "N/mm")}  # strokes and rates of springs
 _SIGNED = re.compile(
     r"(mid-stroke |stated )?(rebound |compression |mean |static |gas |least |largest )?(force|velocity|stroke)( at .*)?"
     r"|(\w+_)?working_space_mean|(\w+ )*suspension travel, mean( \[.*)?"
@@ -143,6 +144,20 @@ class Display:
         shown = _WORK if work else _converted(unit, tuple(sorted(system.items())))
         return shown._replace(factor=-shown.factor) if signed and self.sign == COMPRESSION else shown
 
+    def read(self, unit: str, *, signed: bool = False) -> Shown:
+        """How numbers of a unit are shown where people read them: as `of`, but mm in place of m and N/mm of N/m.
+
+        Arguments:
+            unit: as in `of`.
+            signed: as in `of`.
+
+        >>> Display().read("m"), Display("imperial").read("m").unit
+        (Shown(unit='mm', factor=1000.0), 'in')
+        """
+        factor, unit = _READ.get(unit, (1.0, unit))
+        shown = self.of(unit, signed=signed)
+        return shown._replace(factor=factor * shown.factor)
+
     def signed(self, quantity: str) -> bool:
         """Whether the sign of a quantity is that of the direction, by its name or its label.
 
@@ -163,9 +178,15 @@ class Display:
         """The speed of a vehicle [m/s] in words: in miles an hour where lengths are in inches."""
         return f"{value / 0.44704:.3g} mph" if self._system.get("m") == "in" else f"{value:.4g} m/s"
 
-    def text(self, label: str) -> str:
-        """The label of an axis or a table, with the unit in brackets and the words on the sign that are shown."""
-        return self._turned(re.sub(r"\[([^\[\]]+)\]", lambda match: f"[{self.of(match[1]).unit}]", label))
+    def text(self, label: str, *, read: bool = False) -> str:
+        """The label of an axis or a table, with the unit in brackets and the words on the sign that are shown.
+
+        Arguments:
+            label: with the unit of the library.
+            read: whether the numbers beside it are those of `read`.
+        """
+        shown = self.read if read else self.of
+        return self._turned(re.sub(r"\[([^\[\]]+)\]", lambda match: f"[{shown(match[1]).unit}]", label))
 
     def words(self, sentence: str) -> str:
         """A sentence in the reader's words, with forces, velocities and lengths in the units that are shown."""
@@ -201,14 +222,15 @@ def _figures(text: str) -> int:
     return max(3, len(re.sub(r"^[-−+]?0*\.?0*|\.|e.*", "", text)))
 
 
-_ROUNDING = 1e-8  # relative
+_ROUNDING = 1e-13  # relative: that of sums in double precision
+_FIGURES = 9  # of a value, at the most: a smaller error is said by its power of ten
 
 
 def rounded(value: float, error: float) -> tuple[str, str]:
     """A value and its standard error as text, with the significant digits.
 
-    The error has two digits, the value the digits down to the second digit of the error, but at least one. Errors of
-    the size of rounding, such as the scatter of equal numbers, are zero.
+    The error has two digits, the value the digits down to the second digit of the error, but one at the least and nine
+    at the most. Errors of the size of rounding, such as the scatter of equal numbers, are zero.
 
     Arguments:
         value: the number.
@@ -216,13 +238,15 @@ def rounded(value: float, error: float) -> tuple[str, str]:
 
     >>> rounded(14361.27, 61.8), rounded(0.9035, 0.2912), rounded(3.2, float("inf"))
     (('14361', '62'), ('0.90', '0.29'), ('3.2', 'inf'))
-    >>> rounded(0.0624512, 7e-18)
-    ('0.062451', '0')
+    >>> rounded(0.0624512, 7e-18), rounded(2500.0, 1.3e-6)
+    (('0.062451', '0'), ('2500', '1.3e-06'))
     """
     if error <= _ROUNDING * abs(value):
         error = 0.0
     if not (np.isfinite(error) and np.isfinite(value) and error > 0):
         return f"{value:.5g}", f"{error:.2g}"
+    if error < 10.0**-_FIGURES * abs(value):
+        return f"{value:.{_FIGURES}g}", f"{error:.2g}"
     place = int(np.floor(np.log10(error))) - 1
     place_of_value = min(place, int(np.floor(np.log10(abs(value))))) if value else place
     if max(abs(value), error) >= 1e9 or place_of_value < -9:

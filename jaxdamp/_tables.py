@@ -4,7 +4,6 @@ import csv
 import dataclasses
 import html
 import io
-import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeAlias
@@ -12,72 +11,23 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from jaxdamp import _checks
-from jaxdamp._display import Display, display, plus_minus
+from jaxdamp._cells import (
+    QUANTITIES,
+    Cell as Cell,
+    Column as Column,
+    Shown as Shown,
+    Units,
+    factor_of,
+    is_along_a_road,
+    scaled,
+    typeset_unit as typeset_unit,
+    unit_shown,
+)
+from jaxdamp._display import display
 from jaxdamp._words import path_words, said, typeset
 
 
-Cell = str | float | int | None
 Contents: TypeAlias = dict[str, Any]  # numbers, texts, lists and dictionaries of such, ready for JSON
-
-
-class Shown(float):
-    """A number with the text that a reader is shown; files keep all its digits.
-
-    >>> number = Shown(14361.2734, "14361")
-    >>> f"{number:.4g}", str(number)
-    ('14361', '14361.2734')
-    """
-
-    text: str
-
-    def __new__(cls, value: float, text: str) -> "Shown":
-        """The number, and its text."""
-        self = super().__new__(cls, value)
-        self.text = text
-        return self
-
-    def __reduce__(self) -> tuple[type["Shown"], tuple[float, str]]:
-        return Shown, (float(self), self.text)  # of a copy
-
-    def __format__(self, spec: str) -> str:
-        return self.text
-
-
-class Column(NamedTuple):
-    """A column: its name, its unit, and how a number in it is written for reading.
-
-    Attributes:
-        name: of the column.
-        unit: as it is printed; empty for none.
-        spec: format of a number in it, such as ".3g".
-    """
-
-    name: str
-    unit: str = ""
-    spec: str = ".4g"
-
-    @property
-    def heading(self) -> str:
-        """Name with unit."""
-        return f"{self.name} [{self.unit}]" if self.unit else self.name
-
-    def text(self, cell: Cell) -> str:
-        """A cell for reading; nothing where there is no value."""
-        if cell is None:
-            return ""
-        return display().words(cell) if isinstance(cell, str) else _written(cell, self.spec)
-
-
-def _written(number: float, spec: str) -> str:
-    """A number in a format, but without a power of ten from 0.001 to 99 999, and without a sign of zero.
-
-    >>> [_written(number, ".4g") for number in (11187.4, -1032.4, 0.00123, 8.818e-05, -0.0)] + [_written(-0.04, ".1f")]
-    ['11187', '-1032', '0.00123', '8.818e-05', '0', '0.0']
-    """
-    text = format(number, spec)
-    if "e" in text and not isinstance(number, Shown | int) and 1e-3 <= abs(number) < 1e5:
-        text = f"{number:.0f}" if abs(number) >= 1e3 else np.format_float_positional(float(text), trim="-")
-    return text[1:] if re.fullmatch(r"[-+]0(\.0*)?", text) else text
 
 
 @dataclass(frozen=True, repr=False)
@@ -107,36 +57,43 @@ class Table:
     columns: tuple[Column, ...]
     rows: tuple[tuple[Cell, ...], ...]
 
-    def shown(self) -> "Table":
+    def shown(self, *, read: bool = False) -> "Table":
         """The table in the units and the sign that are shown.
 
         A number has the unit of its column or, where that has none, of the cell of its row in the column "unit".
+
+        Arguments:
+            read: by people, in the units of `Display.read`; distances along a road are in m for everybody.
         """
         present = display()
-        if present.plain:
+        if present.plain and not read:
             return self
-        columns = tuple(c._replace(name=present.text(c.name), unit=_unit_shown(present, c.unit)) for c in self.columns)
-        return Table(present.text(self.title), columns, tuple(self._row_shown(present, row) for row in self.rows))
+        shown = present.read if read else present.of
+        columns = tuple(
+            c if is_along_a_road(c) else c._replace(name=present.text(c.name), unit=unit_shown(shown, c.unit))
+            for c in self.columns
+        )
+        return Table(present.text(self.title), columns, tuple(self._row_shown(shown, row) for row in self.rows))
 
-    def _row_shown(self, present: Display, row: tuple[Cell, ...]) -> tuple[Cell, ...]:
+    def _row_shown(self, shown: Units, row: tuple[Cell, ...]) -> tuple[Cell, ...]:
         by_name = dict(zip((column.name for column in self.columns), row, strict=True))
-        unit, quantity = str(by_name.get("unit", "")), str(next(filter(None, map(by_name.get, _QUANTITIES)), ""))
-        factors = [_factor(present, column, unit, quantity) for column in self.columns]
+        unit, quantity = str(by_name.get("unit", "")), str(next(filter(None, map(by_name.get, QUANTITIES)), ""))
+        factors = [factor_of(shown, column, unit, quantity) for column in self.columns]
         cells = [
-            _unit_shown(present, str(cell)) if column.name == "unit" else _scaled(cell, factor)
+            unit_shown(shown, str(cell)) if column.name == "unit" else scaled(cell, factor)
             for column, cell, factor in zip(self.columns, row, factors, strict=True)
         ]
-        turned = present.turned(tuple(column.name for column in self.columns))
+        turned = display().turned(tuple(column.name for column in self.columns))
         return tuple(cells[to if factors[to] < 0.0 else at] for at, to in enumerate(turned))
 
     def texts(self) -> list[tuple[str, ...]]:
         """The rows for reading."""
-        shown = self.shown()
+        shown = self.shown(read=True)
         return [tuple(c.text(cell) for c, cell in zip(shown.columns, row, strict=True)) for row in shown.rows]
 
     def headings(self) -> list[str]:
-        """The names of the columns with the units that are shown."""
-        return [column.heading for column in self.shown().columns]
+        """The names of the columns with the units in which people read them."""
+        return [column.heading for column in self.shown(read=True).columns]
 
     def only(self, rows: Collection[str] | None = None, columns: Collection[str] | None = None) -> "Table":
         """The rows whose first cell is one of these, and the columns of these names."""
@@ -186,8 +143,9 @@ class Table:
         """All digits, with headings that carry the units."""
         out = io.StringIO()
         writer = csv.writer(out, lineterminator="\n")
-        writer.writerow(self.headings())
-        writer.writerows([_plain_cell(cell) for cell in row] for row in self.shown().rows)
+        shown = self.shown()
+        writer.writerow([column.heading for column in shown.columns])
+        writer.writerows([_plain_cell(cell) for cell in row] for row in shown.rows)
         return out.getvalue()
 
     def to_html(self, *, words: bool = False) -> str:
@@ -214,7 +172,7 @@ class Table:
     __repr__ = to_text
 
 
-_NAMES = ("law", "metric", "parameter", "what")  # columns with names of the library
+_NAMES = ("law", "metric", "parameter", "channel", "what")  # columns with names of the library
 
 
 def _html_cell(text: str, side: str, named: bool, *, words: bool) -> str:
@@ -222,46 +180,6 @@ def _html_cell(text: str, side: str, named: bool, *, words: bool) -> str:
     said = path_words(text) if named else typeset(text) if words else text
     title = f' title="{html.escape(text)}"' if said != text and named else ""
     return f"<td{side}{title}>{html.escape(said)}</td>"
-
-
-_COUNTS = ("count", "cycles", "wheels", "ratio", "times", "(value − true)/se")  # columns whose numbers have no unit
-_SPREADS = ("scatter", "uncertainty", "standard error", "change")  # and those without a sign
-_QUANTITIES = ("quantity", "metric", "finding")  # columns that say what the numbers of a row are
-_BAND = ("from", "to")  # of a force; times and distances have no direction
-
-
-def _factor(present: Display, column: Column, unit: str, quantity: str) -> float:
-    """What a number is shown times, of a row with this unit and quantity, if it states them."""
-    unit_of_column = column.unit or ("" if column.name in _COUNTS else unit)
-    if unit_of_column in ("", "–", "%"):
-        return 1.0
-    signed = present.signed(column.name if column.unit else quantity) and column.name not in _SPREADS
-    signed |= column.unit == "N" and column.name in _BAND
-    signed &= not (quantity and column.name == "velocity")  # it is positive, the direction is in the quantity
-    return present.of(unit_of_column.replace("²", "^2"), signed=signed).factor
-
-
-def _unit_shown(present: Display, unit: str) -> str:
-    return typeset_unit(present.of(unit.replace("²", "^2")).unit, "")
-
-
-def _scaled(cell: Cell, factor: float) -> Cell:
-    """A number of a table times a factor; the text of a `Shown` keeps what its digits say."""
-    if factor == 1.0 or not isinstance(cell, float):
-        return cell
-    value = cell * factor + 0.0
-    if not isinstance(cell, Shown):
-        return value
-    _, sign, error = cell.text.partition(" ± ")
-    if sign:
-        return Shown(value, plus_minus(value, float(error) * abs(factor)))
-    figures = max(3, len(re.sub(r"^-?0*\.?0*|\.|e.*", "", cell.text)))
-    return Shown(value, f"{value:.{figures}g}" if np.isfinite(value) else cell.text)
-
-
-def typeset_unit(unit: str, none: str = "") -> str:
-    """A unit as it is printed: "m/s²" for "m/s^2", and `none` where there is no unit."""
-    return unit.replace("^2", "²") or none
 
 
 def percent_change(before: float, after: float) -> float | None:

@@ -1,5 +1,6 @@
 """Names of laws, parameters and ride metrics as people say them."""
 
+import html
 import re
 
 
@@ -91,10 +92,30 @@ def said(text: str) -> str:
     >>> said("50mm_0.1Hz and Front_A are predicted worst by besinger_lag in m113_003")
     '50mm_0.1Hz and Front_A are predicted worst by Besinger + lag in m113 003'
     """
+    return _printed(_NAME.sub(lambda match: path_words(match[0]), text)).replace("`", "")
+
+
+_PATH = re.compile(rf"\b(?:law|rig|(?:\w+\.)*damper)(?:\.[a-z]\w*|\.\d)+(?![\w(=])|{_NAME.pattern}")
+# What a reader types: code, options with their values, quoted names.
+_TYPED = re.compile(r"(`[^`]*`|--[\w-]+(?:[ =][^\s,.]\S*)?|\"[^\"]*\"|'[^'\s]*')")
+
+
+def said_as_html(text: str) -> str:
+    """A remark as `said`, but what a reader types stays as it is; names of the library are where a mouse rests.
+
+    >>> said_as_html("law.rebound_rate is at a bound: hold it with --freeze law.rebound_rate")
+    '<span title="law.rebound_rate">rebound rate</span> is at a bound: hold it with --freeze law.rebound_rate'
+    """
+    parts = [html.escape(part if typed % 2 else _printed(part)) for typed, part in enumerate(_TYPED.split(text))]
+    parts[::2] = [_PATH.sub(lambda m: f'<span title="{m[0]}">{path_words(m[0])}</span>', part) for part in parts[::2]]
+    return "".join(parts)
+
+
+def _printed(text: str) -> str:
+    """A text with roads of the command line in words, and with arrows, minus and powers as they are printed."""
     text = re.sub(r"\biso:([A-H])\b", r"ISO class \1", text)
     text = re.sub(r"\bbump:([\d.]+):([\d.]+)", lambda at: f"a bump of {1e3 * float(at[1]):g} mm × {at[2]} m", text)
-    text = _NAME.sub(lambda match: path_words(match[0]), text)
-    for plain, printed in (("->", "→"), ("<=", "≤"), (">=", "≥"), ("**", "·"), ("`", "")):
+    for plain, printed in (("->", "→"), ("<=", "≤"), (">=", "≥"), ("**", "·")):
         text = text.replace(plain, printed)
     return typeset(text)
 

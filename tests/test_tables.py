@@ -51,7 +51,8 @@ def test_comparisons_have_a_change_only_of_several() -> None:
     rows = [Compared("travel", "m", (2.0, 3.0), percent_change(2.0, 3.0)), Compared("jerk", "m/s^2", (0.0, 1.0), None)]
     table = comparison_table("T", "metric", ("before", "after"), rows)
     assert [column.heading for column in table.columns] == ["metric", "unit", "before", "after", "change [%]"]
-    assert table.texts() == [("travel", "m", "2", "3", "+50.0"), ("jerk", "m/s²", "0", "1", "")]
+    assert table.texts() == [("travel", "mm", "2000", "3000", "+50.0"), ("jerk", "m/s²", "0", "1", "")]
+    assert table.to_csv().splitlines()[1] == "travel,m,2.0,3.0,50.0"  # for programs, as the library computes
     alone = comparison_table("T", "metric", ("value",), [Compared("lift off", "", (0.1,), None)])
     assert alone.rows == (("lift off", "–", 0.1),)
     assert percent_change(0.0, 1.0) is None and percent_change(4.0, 3.0) == pytest.approx(-25.0)

@@ -24,17 +24,17 @@ def label_axis(axes: Axes, name: Literal["x", "y"], label: str, *, turns: bool =
     from matplotlib.ticker import FuncFormatter, NullFormatter
 
     axis = axes.xaxis if name == "x" else axes.yaxis
-    wrap(axis.set_label_text(display().text(label)), axes)
+    wrap(axis.set_label_text(display().text(label, read=True)), axes)
     match = re.search(r"\[([^\[\]]+)\]", label)
-    shown = display().of(match[1] if match else "", signed=turns or display().signed(label))
+    shown = display().read(match[1] if match else "", signed=turns or display().signed(label))
     factor = times * shown.factor
-    from jaxdamp.plots._ticks import FewTicks, LogTicksInUnit, TicksInUnit
+    from jaxdamp.plots._ticks import FewTicks, LogTicks, LogTicksInUnit, TicksInUnit
 
     if factor == 1.0:
         FewTicks.along(axis)
         return
     log = axis.get_scale() == "log"
-    ticks = LogTicksInUnit(factor) if log else TicksInUnit(factor)
+    ticks = LogTicks(factor) if log else TicksInUnit(factor)
     axis.set_major_locator(ticks)
     axis.set_major_formatter(FuncFormatter(ticks.text))
     if log:

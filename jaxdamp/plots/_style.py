@@ -87,9 +87,9 @@ SIMULATE = "Take what `jaxdamp.simulate(vehicle, road)` gives, or several by nam
 
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure [inch] with automatic margins."""
-    from matplotlib.figure import Figure
+    from jaxdamp.plots._figure import FigureWithFallback
 
-    return Figure(figsize=(width, height), dpi=100, layout="constrained")
+    return FigureWithFallback(figsize=(width, height), dpi=100, layout="constrained")
 
 
 def line_style(index: int) -> Look:
@@ -160,9 +160,8 @@ def quantity(value: float, unit: str, name: str = "") -> str:
     >>> quantity(0.0745, "m"), quantity(60e3, "N/m"), quantity(1.25, "m/s^2"), quantity(3.0, "")
     ('74.5 mm', '60 N/mm', '1.25 m/s²', '3')
     """
-    factor, unit = {"m": (1e3, "mm"), "N/m": (1e-3, "N/mm")}.get(unit, (1.0, unit))
-    shown = display().of(unit, signed=display().signed(name))
-    return f"{short(shown(factor * value))} {typeset_unit(shown.unit)}".rstrip()
+    shown = display().read(unit, signed=display().signed(name))
+    return f"{short(shown(value))} {typeset_unit(shown.unit)}".rstrip()
 
 
 def labelled(words: str, unit: str) -> str:
@@ -178,11 +177,13 @@ def percent(value: float, digits: int = 0) -> str:
 
 
 def plain_log_axis(axis: "matplotlib.axis.Axis") -> None:
-    """A logarithmic axis with ticks at 1, 2 and 5 of each decade, in plain numbers."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+    """A logarithmic axis with ticks at 1, 2 and 5 of each decade, as there is room, in plain numbers."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
 
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=30))
-    axis.set_major_formatter(FuncFormatter(_short_tick))
+    from jaxdamp.plots._ticks import LogTicks
+
+    axis.set_major_locator(ticks := LogTicks())
+    axis.set_major_formatter(FuncFormatter(ticks.text))
     axis.set_minor_formatter(NullFormatter())
 
 
@@ -195,10 +196,6 @@ def within_six_decades(axes: Axes) -> None:
     axes.set_yscale("linear")  # zero has no place on a logarithmic axis
     axes.set_yticks([])
     axes.text(0.5, 0.55, "no motion", transform=axes.transAxes, ha="center", color=GREY)
-
-
-def _short_tick(value: float, _: int | None) -> str:
-    return short(value)
 
 
 _GAP = 0.05  # of two labels of curves, as a share of the height of the axes

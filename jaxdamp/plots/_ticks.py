@@ -31,15 +31,39 @@ class TicksInUnit(MaxNLocator):
 
 
 class LogTicksInUnit(LogLocator):
-    """1, 2 and 5 of each decade of another unit than the one that is drawn, or other multiples of its powers of ten."""
+    """Multiples of the powers of ten of another unit than the one that is drawn."""
 
-    def __init__(self, factor: float, subs: Sequence[float] = (1.0, 2.0, 5.0)) -> None:
+    def __init__(self, factor: float, subs: Sequence[float]) -> None:
         super().__init__(subs=subs, numticks=30)
         self._factor = abs(factor)
 
-    def tick_values(self, vmin: float, vmax: float) -> Sequence[float]:
+    def tick_values(self, vmin: float, vmax: float) -> _Ticks:
         """Where ticks are, in the unit that is drawn."""
-        return [tick / self._factor for tick in super().tick_values(self._factor * vmin, self._factor * vmax)]
+        return np.asarray(super().tick_values(self._factor * vmin, self._factor * vmax)) / self._factor
+
+
+_IN_DECADE = (1.0, 2.0, 5.0)
+
+
+class LogTicks(LogTicksInUnit):
+    """1, 2 and 5 of each decade, or decades alone, as labels have room; within a part of one, round numbers."""
+
+    def __init__(self, factor: float = 1.0) -> None:
+        super().__init__(factor, _IN_DECADE)
+
+    def tick_values(self, vmin: float, vmax: float) -> _Ticks:
+        """Where ticks are, in the unit that is drawn."""
+        ends = self._factor * vmin, self._factor * vmax
+        steps = 10.0 ** np.arange(np.floor(np.log10(min(ends))), np.ceil(np.log10(max(ends))) + 1.0)
+        ticks = np.ravel(steps[:, None] * _IN_DECADE)
+        ticks = ticks[(ticks >= min(ends)) & (ticks <= max(ends))]
+        choices = [ticks, steps]
+        if ticks.size < 2:
+            choices = [MaxNLocator(most, steps=[1, 2, 5, 10]).tick_values(*ends) for most in range(_MANY, 0, -1)]
+        for ticks in (np.asarray(each) / self._factor for each in choices):
+            if _have_room(self.axis, ticks, vmin, vmax):
+                break
+        return ticks
 
     def text(self, value: float, _: int | None) -> str:
         """The label of a tick."""
@@ -74,9 +98,17 @@ class FewTicks(MaxNLocator):
         for most in range(min(self._most, max(axis.get_tick_space(), 1)), 0, -1):
             self._before.set_params(nbins=most)
             ticks = np.asarray(self._before.tick_values(vmin, vmax))
-            if ticks.size < 2 or _needed(axis, ticks) <= np.ptp(ticks[:2]) / abs(vmax - vmin):
+            if _have_room(axis, ticks, vmin, vmax):
                 break
         return ticks
+
+
+def _have_room(axis: object, ticks: np.ndarray, vmin: float, vmax: float) -> bool:
+    """Whether the labels of ticks do not meet, if the axis is horizontal."""
+    if not isinstance(axis, XAxis) or ticks.size < 2:
+        return True
+    at, ends = (axis.get_transform().transform(np.asarray(values, dtype=float)) for values in (ticks, (vmin, vmax)))
+    return bool(_needed(axis, ticks) <= np.diff(at).min() / abs(np.ptp(ends)))
 
 
 def _needed(axis: Axis, ticks: np.ndarray) -> float:

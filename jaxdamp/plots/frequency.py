@@ -171,7 +171,8 @@ def roughness_by_segment(roughness: RoughnessBySegment) -> Figure:
     title = "Roughness by segment"
     if roughness.is_partial:
         title += f" (the last one {roughness.lengths[-1]:.4g} m)"
-    _style.dress(axes, "distance [m]", "IRI [m/km]", title)
+    _style.dress(axes, "", "IRI [m/km]", title)
+    axes.set_xlabel("distance [m]")  # along a road, where mm and inches say nothing
     _style.legend_beside(figure, [bars, line])
     return figure
 

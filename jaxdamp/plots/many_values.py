@@ -13,34 +13,42 @@ from jaxdamp.tune import DamperComparison, Rescore
 
 _COLUMNS = 3  # of panels
 _BINS = 30
-_NAMED = 40  # dampers whose names have room
+_NAMED, _ROW = 40, 0.2  # dampers whose names have room, a line [inch] for each
 
 
 def many_fits(result: ManyFits) -> Figure:
     """The parameters of each damper ± 2 standard errors, and the error of each damper.
 
-    Over the setting of the dampers, if it is stated, otherwise in their order. Intervals without an end are left out.
+    Over the setting of the dampers, if it is stated; otherwise a line for each, with its name, or over their number if
+    they are many. Intervals without an end are left out.
 
     Arguments:
         result: of `identify.fit_many`.
     """
-    places = np.arange(len(result.names), dtype=float) if result.settings is None else np.asarray(result.settings)
-    label = "damper" if result.settings is None else "setting"
-    figure, panels = _panels(len(result.parameters) + 1)
-    units = [owner.unit for owner in result.free.owners]
-    for number, (axes, name) in enumerate(zip(panels, result.parameters, strict=False)):
-        error = 2.0 * result.standard_errors[:, number]
-        error = np.where(np.isfinite(error), error, np.nan)
-        axes.errorbar(
-            places, result.values[:, number], error, fmt="o", color=_style.COLOURS[0], markersize=4, capsize=2
-        )
-        _style.dress(axes, label, f"[{typeset_unit(units[number], '–')}]", _style.path_words(name))
-    panels[-1].plot(places, result.rmse, "o", color=_style.COLOURS[1], markersize=4)
-    _style.dress(panels[-1], label, "[N]", "root of the mean squared force error")
-    if result.settings is None and len(result.names) <= _NAMED:
-        for axes in panels:
-            axes.set_xticks(places, list(map(_style.brief, result.names)), rotation=30, ha="right")
-    figure.suptitle(f"{len(result.names)} dampers, ± 2 standard errors")
+    count, units = len(result.names), [owner.unit for owner in result.free.owners]
+    named = result.settings is None and count <= _NAMED
+    figure, panels = _panels(len(result.parameters) + 1, height=max(2.8, 1.0 + _ROW * count) if named else 2.8)
+    places = np.arange(count, dtype=float) if result.settings is None else np.asarray(result.settings)
+    drawn = [
+        (name, unit, result.values[:, i], 2.0 * result.standard_errors[:, i], _style.COLOURS[0])
+        for i, (name, unit) in enumerate(zip(result.parameters, units, strict=True))
+    ]
+    drawn.append(("root of the mean squared force error", "N", result.rmse, np.zeros(count), _style.COLOURS[1]))
+    for axes, (name, unit, values, error, colour) in zip(panels, drawn, strict=True):
+        look: _style.Look = {"fmt": "o", "color": colour, "markersize": 4, "capsize": 2}
+        error = np.where(np.isfinite(error) & (error > 0.0), error, np.nan)
+        label, title = f"[{typeset_unit(unit, '–')}]", _style.path_words(name)
+        if named:
+            axes.errorbar(values, places, xerr=error, **look)
+            _style.dress(axes, label, "", title)
+            axes.set_yticks(places, [])
+            axes.set_ylim(count - 0.5, -0.5)
+        else:
+            axes.errorbar(places, values, error, **look)
+            _style.dress(axes, "damper" if result.settings is None else "setting", label, title)
+    for axes in panels[::_COLUMNS] if named else ():
+        axes.set_yticks(places, list(map(_style.brief, result.names)))
+    figure.suptitle(f"{count} dampers, ± 2 standard errors")
     return figure
 
 
@@ -101,10 +109,10 @@ def rescore(result: Rescore) -> Figure:
     return figure
 
 
-def _panels(count: int, head: float = 0.6) -> tuple[Figure, list[Axes]]:
-    """So many panels, three in a row, below a head of this height [inch]."""
+def _panels(count: int, head: float = 0.6, height: float = 2.8) -> tuple[Figure, list[Axes]]:
+    """So many panels of this height [inch], three in a row, below a head of this height."""
     rows = -(-count // _COLUMNS)
-    figure = _style.new_figure(12.0, head + 2.8 * rows)
+    figure = _style.new_figure(12.0, head + height * rows)
     grid = figure.add_gridspec(rows, _COLUMNS)
     return figure, [figure.add_subplot(grid[i // _COLUMNS, i % _COLUMNS]) for i in range(count)]
 

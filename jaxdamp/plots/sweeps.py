@@ -335,7 +335,7 @@ def _words(data: Dataset, name: str) -> str:
 
 
 def _shown(data: Dataset, name: str) -> Shown:
-    return display().of(data[name].attrs.get("units", ""), signed=display().signed(name))
+    return display().read(data[name].attrs.get("units", ""), signed=display().signed(name))
 
 
 def _turned(data: Dataset, name: str) -> bool:

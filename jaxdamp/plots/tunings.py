@@ -192,8 +192,7 @@ def _limits(axes: Axes, front: ParetoFront, x: str, y: str) -> list[Artist]:
         for end in (lower, upper):
             if not np.isfinite(end):
                 continue
-            size = f"{_style.short(end)} {typeset_unit(front.units[name])}".rstrip()
-            words = f"limit of {_style.metric_words(name)}, {size}"
+            words = f"limit of {_style.metric_words(name)}, {_style.quantity(end, front.units[name], name)}"
             if name in (x, y):
                 line = axes.axvline if name == x else axes.axhline
                 handles.append(line(end, color=colour, linestyle="--", linewidth=1.2, label=words))

@@ -6,6 +6,7 @@ import html
 import io
 import os
 import platform
+import re
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
@@ -19,7 +20,7 @@ from jaxdamp._second_process import elsewhere
 from jaxdamp._tables import Table
 from jaxdamp._types import Figure
 from jaxdamp._warned import warn
-from jaxdamp._words import first_upper, said
+from jaxdamp._words import first_upper, said, said_as_html
 
 
 class Attempts:
@@ -47,7 +48,8 @@ class Attempts:
                 yield
             except Exception as error:
                 self.troubles.append(f"{what} could not be made: {self._message(error) or type(error).__name__}")
-        self.troubles += [str(warning.message) for warning in caught if warning.category is UserWarning]
+        told = [str(warning.message) for warning in caught if warning.category is UserWarning]
+        self.troubles += [text for text in dict.fromkeys(told) if text not in self.troubles]
 
 
 _FRAME = Path(__file__).with_name("page.html")  # its styles for screens, phones and paper, and links that open parts
@@ -268,7 +270,7 @@ class Report:
 
 
 def _points(items: Sequence[str]) -> str:
-    return "<ul>" + "".join(f"<li>{html.escape(item)}</li>" for item in items) + "</ul>"
+    return "<ul>" + "".join(f"<li>{said_as_html(item)}</li>" for item in items) + "</ul>"
 
 
 def _footer(command: str) -> str:
@@ -298,6 +300,12 @@ class Drawn(NamedTuple):
     warnings: list[str]
 
 
+_NO_GLYPH = re.compile(r"Glyph \d+ .*missing from ")  # a warning of matplotlib, for each letter
+_BOXES = (
+    "Letters that no font of this machine has are boxes in pictures: install a font with them, such as Noto Sans CJK."
+)
+
+
 def drawn(figure: Figure, as_pdf: bool) -> Drawn:
     """A figure drawn, as PDF too if it is asked for."""
     pdf = io.BytesIO()
@@ -307,6 +315,7 @@ def drawn(figure: Figure, as_pdf: bool) -> Drawn:
         if as_pdf:
             figure.savefig(pdf, format="pdf")
     texts = [str(warning.message) for warning in caught if warning.category is UserWarning]
+    texts = list(dict.fromkeys(_BOXES if _NO_GLYPH.match(text) else text for text in texts))
     return Drawn(small, pdf.getvalue(), finding(figure), texts)
 
 

@@ -108,7 +108,7 @@ def ride_verdict(responses: Mapping[str, Response]) -> list[str]:
             for name, response in others
         ]
     units = baseline.metric_units()
-    shown = {goal: display().of(units[names[0]]) for goal, names in goals.items()}
+    shown = {goal: display().read(units[names[0]]) for goal, names in goals.items()}
     most = {goal: "up to " * (len(names) > 1) for goal, names in goals.items()}
     said = [f"{WORDS[g]} {most[g]}{s(values[first][g]):.3g} {typeset_unit(s.unit)}" for g, s in shown.items()]
     feel = ""

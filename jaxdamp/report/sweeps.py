@@ -178,5 +178,5 @@ def _where(data: Dataset, axes: Sequence[str], place: Mapping[Hashable, DataArra
 
 def _in_words(data: Dataset, name: str, value: ScalarLike | DataArray) -> str:
     """A value of an axis or a result, rounded in the unit in which it is shown."""
-    shown = display().of(data[name].attrs.get("units", ""))
+    shown = display().read(data[name].attrs.get("units", ""))
     return f"{shown(float(value)):.4g} {typeset_unit(shown.unit)}".rstrip()

@@ -212,7 +212,7 @@ class TuneResult(AbstractResult, Generic[V]):
         if name not in self.limits:
             return target
         span = self.limits[name]
-        shown, (lower, upper) = display().of(self.units[name]), span if isinstance(span, tuple) else (-math.inf, span)
+        shown, (lower, upper) = display().read(self.units[name]), span if isinstance(span, tuple) else (-math.inf, span)
         text = f"{written((shown(lower), shown(upper)))} {typeset_unit(shown.unit)}".rstrip()
         text += ", tightened" * (name in self.tightened)
         mark = ", violated" if name in self.violated else ", reached" * (name in self.active_limits)

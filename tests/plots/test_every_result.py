@@ -69,7 +69,13 @@ def test_fits_of_many_dampers_and_a_posterior(runs: BenchSet) -> None:
     many = identify.fit_many(Bilinear, {"one": runs[:1], "two": runs[1:2], "three": runs[2:]})
     figure = many.plot()
     assert titles(figure) == ["rebound rate", "compression rate", "root of the mean squared force error"]
-    np.testing.assert_allclose(np.asarray(figure.axes[0].get_lines()[0].get_ydata(), float), many.values[:, 0])
+    np.testing.assert_allclose(np.asarray(figure.axes[0].get_lines()[0].get_xdata(), float), many.values[:, 0])
+    assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["one", "two", "three"]
+    long = dataclasses.replace(many, names=tuple(f"damper of the second prototype, front left, {n}" for n in range(3)))
+    figure = long.plot()
+    figure.draw_without_rendering()
+    assert all(axes.bbox.height > 0.6 * figure.bbox.height for axes in figure.axes)
+    assert all(axes.bbox.width > 0.2 * figure.bbox.width for axes in figure.axes)
     settings = dataclasses.replace(many, settings=(1.0, 2.0, 4.0)).plot()
     np.testing.assert_allclose(np.asarray(settings.axes[0].get_lines()[0].get_xdata(), float), [1.0, 2.0, 4.0])
 

@@ -92,7 +92,7 @@ def test_sweeps_mark_the_present_design_and_what_no_point_beats(swept: xarray.Da
     marks = {line.get_label(): line for line in plots.sweep(swept, COMFORT, present=present).axes[0].get_lines()}
     np.testing.assert_array_equal(marks["present"].get_xydata(), [[1800.0, 21e3]])
     outside = plots.sweep(swept, COMFORT, present=present | {"spring_rate": 50e3}).axes[0].get_lines()
-    assert "present outside the grid: 1800 N s/m, 50000 N/m" in {line.get_label() for line in outside}
+    assert "present outside the grid: 1800 N s/m, 50 N/mm" in {line.get_label() for line in outside}
     plane = plots.sweep(swept, COMFORT, against=GRIP, limits={GRIP: 640.0}, present=present).axes[0]
     marks = {line.get_label(): line for line in plane.get_lines()}
     np.testing.assert_array_equal(marks["present"].get_xydata(), [[0.8, 500.0]])

@@ -8,11 +8,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import xarray
+from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.text import Annotation, Text
 
 from jaxdamp import bench, plots, roads, simulate, vehicles
+from jaxdamp._display import Display, shown_in
 from jaxdamp.bench import BenchSet
 from jaxdamp.dampers import Linear
 from jaxdamp.plots import _rides, _style
@@ -75,6 +77,25 @@ def test_numbers_along_an_axis_have_room(largest: float) -> None:
     axes = figure.subplots()
     axes.plot([-largest, largest], [-1.0, 1.0])
     _style.dress(axes, _style.VELOCITY, _style.FORCE)
+    check_numbers_along(axes)
+
+
+@pytest.mark.parametrize("ends", [(0.5, 0.7), (3.0, 4.2), (0.1, 30.0), (2.0, 90.0)])
+@pytest.mark.parametrize("units", ["SI", "imperial"])
+def test_numbers_along_a_logarithmic_axis_have_room(ends: tuple[float, float], units: str) -> None:
+    figure = _style.new_figure(9.0, 3.0)
+    axes = figure.subplots(1, 4)[0]
+    axes.loglog(ends, [1.0, 10.0])
+    _style.plain_log_axis(axes.xaxis)
+    with shown_in(Display(units)):
+        _style.dress(axes, "velocity [m/s]", "")
+    check_numbers_along(axes)
+
+
+def check_numbers_along(axes: Axes) -> None:
+    """The labels of two or more ticks of an abscissa, none over another."""
+    figure = axes.get_figure(root=True)
+    assert figure is not None
     figure.draw_without_rendering()
     low, high = axes.get_xlim()
     labels: list[Text] = [t.label1 for t in axes.xaxis.get_major_ticks() if low <= t.get_loc() <= high]
@@ -93,7 +114,7 @@ def test_curves_of_a_sweep_are_named_in_words_and_limits_are_red(swept: xarray.D
     data = swept.isel(spring_rate=slice(0, 9, 2))
     figure = plots.sweep(data, COMFORT, over="damper.rate", limits={GRIP: 480.0, COMFORT: 0.9})
     curves = figure.legends[0]
-    assert curves.get_texts()[0].get_text() == "spring rate = 10000 N/m"
+    assert curves.get_texts()[0].get_text() == "spring rate = 10 N/mm"
     rings = [c for c in figure.axes[0].collections if len(c.get_edgecolor())]
     red = to_rgba(_style.BAD)
     assert len(rings) == 2 and all(np.allclose(ring.get_edgecolor(), red) for ring in rings)

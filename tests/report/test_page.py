@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.font_manager import findfont, get_font
 from PIL import Image
 
 import jaxdamp
@@ -15,6 +16,7 @@ from jaxdamp import plots
 from jaxdamp._display import Display, shown_in
 from jaxdamp._tables import Column, Table
 from jaxdamp.dampers import Bilinear, Linear, with_fitted_range
+from jaxdamp.plots import _figure
 from jaxdamp.report import Attempts, Report
 
 
@@ -41,6 +43,47 @@ def test_a_report_escapes_what_it_is_told() -> None:
     footer = body.partition("<footer>")[2]
     assert f"by jaxdamp {jaxdamp.__version__} (jax {jax.__version__}" in footer
     assert "<pre>jaxdamp fit &#x27;a &amp; b&#x27;</pre>" in footer and "<pre>" not in report.to_html()
+
+
+def test_remarks_have_the_words_of_tables_and_what_is_typed_stays() -> None:
+    report = Report("title")
+    report.table(Table("Parameters", (Column("parameter"),), (("law.rebound_rate",),)))
+    report.points(
+        ["law.knots[0] < law.rebound_rate and front.damper.rate are at -2 N s/m: `bounds={'law.rebound_rate': (1, 2)}`"]
+    )
+    report.points(["Take the damper's --law piecewise_linear,table, or --freeze law.rebound_rate."])
+    named, path = '<span title="law.rebound_rate">rebound rate</span>', "law.rebound_rate"
+    knots, rate = '<span title="law.knots">knots</span>', '<span title="front.damper.rate">front damper rate</span>'
+    page = report.to_html()
+    assert '<td title="law.rebound_rate">rebound rate</td>' in page
+    assert (
+        f"<li>{knots}[0] &lt; {named} and {rate} are at −2 N s/m: `bounds={{&#x27;{path}&#x27;: (1, 2)}}`</li>" in page
+    )
+    assert f"<li>Take the damper&#x27;s --law piecewise_linear,table, or --freeze {path}.</li>" in page
+
+
+def test_letters_that_no_font_has_are_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    report = Report("title")
+    monkeypatch.setattr(_figure, "EAST_ASIAN", ())
+    for name in ("a.png", "b.png"):
+        report.picture(plots.force_velocity({"减震器 前左": Linear(1000.0)}), "law", name)
+    report.to_html()
+    (told,) = report.attempts.troubles
+    assert told.startswith("Letters that no font of this machine has are boxes in pictures: install ")
+
+
+def test_letters_are_taken_from_another_font_of_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    letter, other = next(
+        (chr(code), name)
+        for name in ("STIXGeneral", "cmsy10")
+        for code in get_font(findfont(name)).get_charmap()
+        if code not in get_font(findfont("DejaVu Sans")).get_charmap()
+    )
+    monkeypatch.setattr(_figure, "EAST_ASIAN", ("No Such Font", other))
+    report = Report("title")
+    report.picture(plots.force_velocity({f"law {letter}": Linear(1000.0), "b": Linear(2000.0)}), "laws", "a.png")
+    report.to_html()
+    assert not report.attempts.troubles
 
 
 def test_sections_are_linked_at_the_top() -> None:
