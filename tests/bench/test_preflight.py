@@ -169,6 +169,14 @@ def test_a_force_that_never_changes_is_an_error_without_warnings(force):
     ]
 
 
+def test_a_copy_of_a_record_is_an_error():
+    """It counted twice, and predicted its twin where records were held out."""
+    first, again = VirtualDyno(LAWS["bilinear"], force_noise=3.0).run([SineTest(0.02, f) for f in (1.0, 2.0)])
+    found = preflight([first, again, replace(first, name="copy")])
+    assert [(f.name, f.records, f.severity) for f in found.findings] == [("copy", ("copy",), "error")]
+    assert f"a copy of {first.name}" in found.findings[0].message
+
+
 def test_mixed_settings_and_a_turned_record():
     test = [SineTest(0.02, f, cycles=4) for f in (1.0, 1.1, 1.2)]
     runs = list(VirtualDyno(LAWS["bilinear"], **SENSORS).run(test))

@@ -157,7 +157,7 @@ def preflight(runs: BenchRun | Iterable[BenchRun]) -> Preflight:
     """
     chosen = [run for run in as_records(runs, "preflight(runs)") if not run.of_points]  # these are no motion
     findings = [finding for run in chosen for finding in _of_record(run)]
-    for family in ((turned_by_the_reader, turned_motion), (mixed_settings,)):
+    for family in ((copies,), (turned_by_the_reader, turned_motion), (mixed_settings,)):
         wrong = {name for finding in findings if finding.severity == "error" for name in finding.records}
         sound = [run for run in chosen if run.name not in wrong]
         findings += [finding for check in family for finding in check(sound)]
@@ -227,6 +227,19 @@ def _first_error(run: BenchRun, robust: bool) -> Finding | None:
     examined = Examined(run)
     findings = (finding for check in ERRORS for finding in check(examined) if finding.severity == "error")
     return next((finding for finding in findings if not (robust and finding.name.endswith("spikes"))), None)
+
+
+def copies(runs: Sequence[BenchRun]) -> list[Finding]:
+    """Records that are another one once more, sample by sample: no measurement repeats its noise."""
+    firsts: dict[bytes, str] = {}
+    findings = []
+    for run in runs:
+        first = firsts.setdefault(run.stroke.tobytes() + run.force.tobytes(), run.name)
+        if first != run.name:
+            message = f"a copy of {first}: all samples are the same"
+            remedy = "Leave it out: it would count twice, and be predicted by itself where records are held out."
+            findings.append(Finding("error", "copy", (run.name,), message, None, "", None, remedy))
+    return findings
 
 
 def mixed_settings(runs: Sequence[BenchRun]) -> list[Finding]:
