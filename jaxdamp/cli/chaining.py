@@ -51,8 +51,8 @@ def report(
     that the records determine. Ends with exit code 1 if a limit is not met.
 
     Arguments:
-        law: names of laws to fit, see "jaxdamp laws": "linear,besinger"; or "all"; six that suit the records if left
-            out.
+        law: names of laws to fit, see "jaxdamp laws": "linear,besinger"; or "all"; those that suit the records if
+            left out.
         minimise: the goal: comfort, travel, grip, or the name of a ride metric.
     """
     names, make = law_names(law), parse_vehicle(vehicle)

@@ -83,7 +83,7 @@ def fit(
     the results, and the same command later, with --replace, fits only dampers that are new or changed.
 
     Arguments:
-        law: names of laws, see "jaxdamp laws": "linear,besinger"; or "all"; six that suit the records if left out.
+        law: names of laws, see "jaxdamp laws": "linear,besinger"; or "all"; those that suit the records if left out.
         held_out: records to score on, not to fit: a name or a pattern, such as "30mm_*".
         rig: what the test machine adds.
         cross_validate: predict each record by the best law fitted to the others.
@@ -273,7 +273,8 @@ def show(screen: Screen, fits: Fitted) -> None:
     screen.points(fits.failures, style="red")
     points = all(run.of_points for run in best.result.runs)
     further = len(set(names_of(points=points)) - {rung.name for rung in comparison.rungs})
-    if several and best.doubt and further:
+    unsure = best.doubt or any(identify.COMPARE_LAWS in warning for warning in best.result.warnings)
+    if several and unsure and further:
         screen.points([f"--law all tries {further} further laws"])
     warnings = best.result.warnings if screen.verbose else best.result.main_warnings
     screen.remarks([*warnings, *comparison.verdict[lines:]], style="yellow")

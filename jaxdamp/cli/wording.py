@@ -30,9 +30,10 @@ CALLS = {
     r" It is in `result\.rig`, not in the law,": " It is in machines/, not in the law,",
     r"; `law \+ dampers\.Spring\([^`]*` is the damper if it is gas": "",
     r'add "(\w+)" or "(\w+)" to the machine \(`rig`\)': r"add --rig \1 or --rig \2",
-    r'add "(\w+)" to the machine \(`rig`\)': r"add --rig \1",
+    r'add "(\w+)" to the machine \(`rig`\)': r"add --rig offset,\1",  # beside the default, which it replaces
+    r'beside a "(\w+)" of the machine \(`rig`\)': r"with --rig offset,\1",
     r"or a `Spring` to the law": "or fit a law with a spring",
-    r'`rig="(\w+)"`': r"--rig \1",
+    r'`rig="heat"`': "--rig offset,heat",
     r"or put the law into `Play`": "or fit --law besinger_play",
     r" \(`identify\.design_experiment` proposes tests\)": "",
     r"\bskip_bad=True\b": "--skip-bad",
@@ -65,7 +66,7 @@ CALLS = {
     r"subtract it, `process\(without=[^`]*`": "fit it beside the law, --rig gas",
     r"`bounds=\{[^`]*`": "--bound",
     r"Pass `tyre_lifts=True` to the vehicle": "Write tyre_lifts = true into a vehicle file (docs/vehicles.md)",
-    r"`process\(delay=[^)]*\)`": "fit with --rig delay",
+    r"`process\(delay=[^)]*\)`": "fit with --rig offset,delay",
     r"with `jaxdamp\.parameters\.replace\([^']*'([^']*)'[^`]*`": r"with \1 = NUMBER below [parameters] of VEHICLE.toml",
 }
 """Calls of Python in the sentences of the library, as patterns, and what the command line says instead."""

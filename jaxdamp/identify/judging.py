@@ -31,7 +31,7 @@ from jaxdamp.identify.estimates import Estimate
 from jaxdamp.identify.estimating import GAIN, Estimates, estimate, on_misfit
 from jaxdamp.identify.identifiability import gas_in_words
 from jaxdamp.identify.law_result import FitResult
-from jaxdamp.identify.left_out import left_out
+from jaxdamp.identify.left_out import LeftOut, left_out
 from jaxdamp.identify.model import (
     Model,
     count_states,
@@ -101,7 +101,8 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
         *off_span(model, problem.fitted_to, problem.initial_state),
     )
     commands = not_followed(law, problem.fitted_to, pooled=pooled)
-    effects: list[str] = [] if commands else left_out(problem, best)  # which would be taken for what the commands do
+    missed = LeftOut([]) if commands else left_out(problem, best)  # which would be taken for what the commands do
+    effects = missed.sentences
     on_rest = on_misfit(noise, estimates.estimates, bool(effects))
     on_records += _averaged(problem, best)
     gas = gas_in_words(model, problem.fitted_to, estimates.estimates, estimates.covariance)
@@ -120,6 +121,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
         initial_state=problem.initial_state,
         record_rigs=tuple(rig for rig in map(rig_of, models) if rig is not None),
         record_starts=starts_in(model),
+        delay_left_out=missed.delay,
         **fields_of_fit(problem, solution, noise, estimates),
     )
 

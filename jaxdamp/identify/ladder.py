@@ -150,7 +150,7 @@ def suited_laws(runs: Iterable[BenchRun]) -> tuple[str, ...]:
     if loop <= LOOP * force:
         chosen = {"linear", *CURVES, "linear_friction", LAGGING[0]}
     elif slow > DRY * loop:
-        chosen = {*CURVES, LAGGING[1], *RUBBING}
+        chosen = {*CURVES, *LAGGING, *RUBBING}  # a lag behind a digressive curve looks like friction
     else:
         chosen = {*CURVES, *LAGGING, RUBBING[1]}
     return tuple(name for name in LAWS if name in chosen)

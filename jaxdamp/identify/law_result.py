@@ -123,10 +123,12 @@ class FitResult(AbstractFitted, Fit):
     Attributes:
         record_laws: the law of each record, if parameters have a value for each record; `law` then has their means.
         record_rigs: the test machine of each record, as `record_laws`.
+        delay_left_out: delay of the force [s] that most of the squared residual is like; None if it is not.
     """
 
     record_laws: tuple[AbstractDamper, ...] = dataclasses.field(default=(), kw_only=True)
     record_rigs: tuple[Rig, ...] = dataclasses.field(default=(), kw_only=True)
+    delay_left_out: float | None = dataclasses.field(default=None, kw_only=True)
 
     @property
     def static_force(self) -> float:

@@ -57,7 +57,8 @@ REFINED = 4  # times that the size of a delay or a lag is refined
 FIRST_SIZE = 1e-6  # s, of a delay or a lag
 MOST_EFFECTS = 3
 MAINS_GRID = 0.05  # Hz, to which lines of the mains are rounded
-LAST_WORD = "Compare laws before anything is added to the machine."
+MOST = 0.5  # of the squared residual
+COMPARE_LAWS = "Compare laws before anything is added to the machine."
 
 
 class _Named(NamedTuple):
@@ -75,7 +76,14 @@ class _Named(NamedTuple):
         return f"{_percent(self.share)} % {{}} like {self.effect.words(self.sizes)}"
 
 
-def left_out(problem: Problem, best: SearchEnd) -> list[str]:
+class LeftOut(NamedTuple):
+    """What a fit left out: in words, and the delay of the force [s] that most of its residual is like."""
+
+    sentences: list[str]
+    delay: float | None = None
+
+
+def left_out(problem: Problem, best: SearchEnd) -> LeftOut:
     """A sentence on each effect that the residual shows, or one on the law where no effect of a machine explains it.
 
     Offset, gas spring, mass, friction, delay, low-pass filter, heat, zero that drifts, gain of a record, clearance;
@@ -83,12 +91,12 @@ def left_out(problem: Problem, best: SearchEnd) -> list[str]:
     """
     used = problem.used
     if problem.is_rounding(best.squares) or np.count_nonzero(used) <= 2 * best.values.size:
-        return []
+        return LeftOut([])
     span = np.linalg.qr(unit_columns(best.jacobian)[0][used])[0]
     residual = span_free(span, -best.residual[used])
     records = list(records_of(problem, best))
     if not records:
-        return []
+        return LeftOut([])
     squares, repeated = float(residual @ residual), _repeated(residual, records)
     of_mains, residual, span = _mains(problem, records, residual, span)
     scatter, least = _scatter(problem, records, squares)
@@ -103,9 +111,18 @@ def left_out(problem: Problem, best: SearchEnd) -> list[str]:
         not static and repeated > 0 and left > max(OF_THE_LAW * asked, sure)
     ):
         of_law = _of_the_law(named, left / repeated if repeated > 0 else 1.0, is_memoryless(problem.law))
-        return [*scatter, of_law, *of_mains]
+        return LeftOut([*scatter, of_law, *of_mains], _delay(named))
     looks = ((one.words.format("of the squared residual look"), one.effect.remedy) for one in named)
-    return [*scatter, *(f"{look}, which the fit leaves out: {remedy}." for look, remedy in looks), *of_mains]
+    words = (f"{look}, which the fit leaves out: {remedy}." for look, remedy in looks)
+    return LeftOut([*scatter, *words, *of_mains], _delay(named))
+
+
+def _delay(named: Sequence[_Named]) -> float | None:
+    """The delay [s] that most of the residual is like, unless memory of the damper explains it better."""
+    if named and named[-1].effect.name == "hysteresis":
+        return None
+    sizes = (float(one.sizes[0]) for one in named if one.effect.name == "delay" and one.share > MOST)
+    return next(sizes, None)
 
 
 def _to_explain(named: Sequence[_Named], repeated: float, records: Sequence[Record]) -> float:
@@ -127,12 +144,12 @@ def _of_the_law(named: Sequence[_Named], left: float, memoryless: bool) -> str:
         effect = named[-1].effect
         misses = f"By the residual, the law misses {effect.words(named[-1].sizes)}{alike}"
         if memoryless:
-            return f"{misses}: {effect.remedy}. {LAST_WORD}"
+            return f"{misses}: {effect.remedy}. {COMPARE_LAWS}"
         of_memory = effect.remedy if effect.name == "hysteresis" else ""
-        return f"{misses}: {of_memory}." if of_memory else f"{misses}. {LAST_WORD}"
+        return f"{misses}: {of_memory}." if of_memory else f"{misses}. {COMPARE_LAWS}"
     return (
         f"The residual repeats from cycle to cycle, and no effect of the test machine explains"
-        f" {_percent(min(left, 1.0))} % of that{alike}: the law misses something of the damper. {LAST_WORD}"
+        f" {_percent(min(left, 1.0))} % of that{alike}: the law misses something of the damper. {COMPARE_LAWS}"
     )
 
 

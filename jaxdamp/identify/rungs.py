@@ -236,7 +236,8 @@ def verdict(choice: Recommendation[Rung], rungs: Sequence[Rung], held_out: Seque
     moved = not all(run.of_points for run in best.result.runs)  # a table has no hysteresis to be followed
     static = [rung for rung in rungs if moved and is_memoryless(rung.result.law)]
     rung = best if is_memoryless(best.result.law) or not static else recommendation(static).rung
-    sentences = [_error_of(best, rungs, held_out), *why(choice, rungs, made=best.reduced)]
+    reasons = [*why(choice, rungs, made=best.reduced), *_late(best, rung)]
+    sentences = [_error_of(best, rungs, held_out), *[" ".join(reasons)] * bool(reasons)]
     if static and not rung.is_exact:
         part = rung.result.error_shares.hysteresis
         lead = "It is a law of velocity alone" if rung is best else f"The best law of velocity alone is {rung.name}"
@@ -255,6 +256,18 @@ def verdict(choice: Recommendation[Rung], rungs: Sequence[Rung], held_out: Seque
     return (*sentences, *_remaining(best, rungs))
 
 
+def _late(best: Rung, static: Rung) -> list[str]:
+    """A sentence where the memory of the recommended law may be a delay of the channel, as that without shows."""
+    if static is best or isinstance(static.result, ScheduledFit) or static.result.delay_left_out is None:
+        return []
+    late = 1e3 * static.result.delay_left_out
+    way = "late" if late > 0 else "early"
+    return [
+        f"By {static.name}, the force channel may be {abs(late):.2g} ms {way}, which {best.name} imitates:"
+        ' compare beside a "delay" of the machine (`rig`).'
+    ]
+
+
 def _remaining(best: Rung, rungs: Sequence[Rung]) -> list[str]:
     """Sentences on hysteresis and shape that the recommended law has not followed."""
     if best.is_exact:
@@ -265,7 +278,10 @@ def _remaining(best: Rung, rungs: Sequence[Rung]) -> list[str]:
     if remaining.shape >= SHAPE:
         part = 100 * remaining.shape
         missing = [name for name, law in CURVES.items() if not any(isinstance(r.result.law, law) for r in rungs)]
-        remedy = f"try {' or '.join(missing)}, which follow any curve" if missing else "no law tried follows it better"
+        follow = "follows" if len(missing) == 1 else "follow"
+        remedy = (
+            f"try {' or '.join(missing)}, which {follow} any curve" if missing else "no law tried follows it better"
+        )
         sentences.append(f"{part:.0f} % of the squared error of {best.name} is shape, of the curve: {remedy}.")
     return sentences
 

@@ -19,8 +19,8 @@ def test_a_delay_that_is_fitted_is_no_finding_of_the_preflight(tmp_path: Path) -
     dyno = VirtualDyno(Bilinear(2600.0, 1200.0), sampling_rate=500.0, force_noise=2.0, force_delay=0.004)
     dyno.run([SineTest(0.01, f, name=f"{f:g} Hz") for f in (1.0, 2.0, 4.0)]).write(tmp_path / "late")
     words = ("fit", tmp_path / "late", "--law", "bilinear", "--out", tmp_path / "fit")
-    assert "fit with --rig delay" in " ".join(jaxdamp(*words).output.split())
-    words = (*words[:-1], tmp_path / "delayed", "--rig", "delay")
+    assert "fit with --rig offset,delay" in " ".join(jaxdamp(*words).output.split())
+    words = (*words[:-1], tmp_path / "delayed", "--rig", "offset,delay")
     assert "Preflight" not in jaxdamp(*words).output
 
 

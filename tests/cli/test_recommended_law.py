@@ -54,7 +54,8 @@ def test_verdict_object_file_and_page_never_disagree(situation: str, tmp_path: P
     screen.console = Console(file=text, width=400)
     show(screen, Fitted(comparison, []))
     assert text.getvalue().strip().startswith(f"Recommended: {best.name}, ")
-    assert ("--law all tries" in text.getvalue()) == bool(best.doubt)
+    misses = any("Compare laws before anything" in warning for warning in best.result.warnings)
+    assert ("--law all tries" in text.getvalue()) == (bool(best.doubt) or misses)
     attempts = Attempts()
     write_fits(tmp_path, comparison, BenchSet(bench.as_runs(runs)), attempts)
     assert not attempts.troubles
@@ -65,12 +66,25 @@ def test_verdict_object_file_and_page_never_disagree(situation: str, tmp_path: P
     assert not best.doubt or not near  # never one with doubt where one without predicts as well
 
 
+def test_further_laws_are_offered_where_the_residual_shows_that_the_law_misses_something() -> None:
+    runs = tuple(VirtualDyno(KINKED, sampling_rate=400.0, force_noise=5.0).run(TESTS))
+    comparison = identify.compare({"linear": Linear, "bilinear": Bilinear}, runs)
+    screen, text = Screen(), io.StringIO()
+    screen.console = Console(file=text, width=400)
+    show(screen, Fitted(comparison, []))
+    assert not comparison.best.doubt and "--law all tries 15 further laws" in text.getvalue()
+
+
 @pytest.mark.parametrize(
     ("said", "option"),
     [
-        ('80 % look like a delay: add "delay" to the machine (`rig`), or take a law with hysteresis.', "--rig delay"),
+        (
+            '80 % look like a delay: add "delay" to the machine (`rig`), or take a law with hysteresis.',
+            "--rig offset,delay",
+        ),
+        ('Which it imitates: compare beside a "delay" of the machine (`rig`).', "compare with --rig offset,delay."),
         ('Add "gas" or "offset": add "gas" or "offset" to the machine (`rig`).', "--rig gas or --rig offset"),
-        ("If a channel is late, `process(delay=0.002)`; hysteresis needs a law with a lag.", "--rig delay"),
+        ("If a channel is late, `process(delay=0.002)`; hysteresis needs a law with a lag.", "--rig offset,delay"),
         ("Mend the earthing, or filter: `process(low_pass=25)` if the motion allows it.", "--filter 25 "),
         (
             "Laws of velocity have none: subtract it, `process(without=bench.separate_gas_and_friction(run))`.",
@@ -82,7 +96,7 @@ def test_verdict_object_file_and_page_never_disagree(situation: str, tmp_path: P
         ),
         ("Laws with memory and means suffer: `process(moving=True)` cuts it off.", "--keep-rest"),
         ('If it is mm, read the file with `units={"stroke": "mm"}`.', "--units stroke=mm"),
-        ('Or fit the heat beside the law, `rig="heat"`.', "--rig heat"),
+        ('Or fit the heat beside the law, `rig="heat"`.', "--rig offset,heat"),
         ('Name the columns: `columns={"stroke": ..., "force": ...}`.', "--columns stroke=...,force=..."),
         (
             "They lie at rate = 1. Look at them with `data.where(data.failed, drop=True)`, and at `data.reason`.",

@@ -8,7 +8,7 @@ import pytest
 
 from jaxdamp import bench, identify
 from jaxdamp.bench import BenchRun, BenchSet, SineTest
-from jaxdamp.dampers import AbstractDamper, Bilinear, Lag, Linear
+from jaxdamp.dampers import AbstractDamper, Besinger, Bilinear, Lag, Linear
 from jaxdamp.identify import error_shares
 from jaxdamp.identify.rows import samples_in_block
 
@@ -16,8 +16,8 @@ from jaxdamp.identify.rows import samples_in_block
 TESTS = [SineTest(0.01, f) for f in (1.0, 3.0, 6.0)]
 
 
-def _runs(law: AbstractDamper, noise: float) -> BenchSet:
-    return bench.VirtualDyno(law, sampling_rate=1000.0, force_noise=noise).run(TESTS)
+def _runs(law: AbstractDamper, noise: float, force_delay: float = 0.0) -> BenchSet:
+    return bench.VirtualDyno(law, sampling_rate=1000.0, force_noise=noise, force_delay=force_delay).run(TESTS)
 
 
 def test_the_error_of_the_true_law_is_noise() -> None:
@@ -66,6 +66,26 @@ def test_the_verdict_names_the_law_that_has_what_the_static_one_lacks() -> None:
     assert second.startswith("The best law of velocity alone is linear: ") and "is hysteresis" in second
     rungs = {rung.name: rung for rung in comparison.rungs}
     assert third == f"lagging has a {rungs['linear'].error / rungs['lagging'].error:.1f} times smaller error."
+
+
+def test_a_late_channel_that_a_memory_imitates_is_named_with_its_delay() -> None:
+    """The law with a lag was recommended without a word, and mistook other motions by 6 % where the other had 0.1 %."""
+    starts = {"bilinear": Bilinear, "lagging": Lag(Bilinear(2000.0, 1500.0), 0.001)}
+    runs = tuple(_runs(Bilinear(3000.0, 1000.0), 5.0, force_delay=0.002))
+    comparison = identify.compare(starts, runs)
+    assert comparison.best.name == "lagging"
+    assert "By bilinear, the force channel may be 2 ms late, which lagging imitates" in comparison.verdict[1]
+    beside = identify.compare(starts, runs, rig=("offset", "delay"))
+    assert beside.best.name == "bilinear" and "imitates" not in " ".join(beside.verdict)
+    of_the_damper = identify.compare(starts, tuple(_runs(Lag(Bilinear(3000.0, 1000.0), 0.008), 5.0)))
+    assert of_the_damper.best.name == "lagging" and "imitates" not in " ".join(of_the_damper.verdict)
+
+
+def test_a_lag_behind_a_digressive_curve_is_tried_although_its_loop_looks_like_friction() -> None:
+    """Without it the recommended law mistook new motions by 4.3 %, and by 0.1 % with it."""
+    lagging = Lag(Besinger(1600.0, 4200.0, 900.0, 0.13, 0.05), 0.002)
+    runs = bench.VirtualDyno(lagging, 1000.0).run(SineTest(0.03, 4.0))
+    assert {"besinger_lag", "lugre_spring"} < set(identify.suited_laws(runs))
 
 
 def test_an_exact_law_leaves_no_error_to_compare_with() -> None:
