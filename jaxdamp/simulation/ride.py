@@ -46,6 +46,9 @@ from jaxdamp.simulation.wheels import delays_by_itself, heights_under_wheels, mo
 from jaxdamp.vehicles import AbstractVehicle, EquivalentDamper, is_stationary, refuse_controller
 
 
+SEQUENCE = 1_000_000  # instants of all cars together up to which they are driven one after the other
+
+
 @final
 class Ride(eqx.Module):
     """The ride metrics of a vehicle on a road as a pure function of its parameters: `ride({path: value})`.
@@ -167,6 +170,14 @@ class Ride(eqx.Module):
         if self.engine.runs_printed:
             return 2048
         return 128 if target().fused_loops else 2048
+
+    @property
+    def sequential_points(self) -> int:
+        """Up to how many cars a CPU has sooner one after the other.
+
+        They take a second, and a program of many cars 2 to 20 s longer to compile than one of a car.
+        """
+        return 0 if self.engine.runs_printed or self.heights is None else SEQUENCE // self.heights.shape[0]
 
     @property
     def derivatives(self) -> tuple[Mode, ...]:

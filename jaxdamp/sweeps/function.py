@@ -64,6 +64,16 @@ class HasSideBySide(Protocol):
 
 
 @runtime_checkable
+class HasSequence(Protocol):
+    """A function whose program of one point compiles in a fraction of the time of that of many."""
+
+    @property
+    def sequential_points(self) -> int:
+        """Up to how many points a CPU has sooner one after the other."""
+        ...
+
+
+@runtime_checkable
 class HasReach(Protocol):
     """A function with a form for points all over a range."""
 
@@ -95,7 +105,9 @@ class HasDomain(Protocol):
         ...
 
 
-class SweepFunction(HasUnits, HasLanes, HasDerivatives, HasSideBySide, HasReach, HasPrinted, HasDomain, Protocol):
+class SweepFunction(
+    HasUnits, HasLanes, HasDerivatives, HasSideBySide, HasSequence, HasReach, HasPrinted, HasDomain, Protocol
+):
     """A function that says all of it, as `jaxdamp.Ride` does."""
 
     def __call__(self, point: dict[str, Scalar]) -> Mapping[str, Array]:
@@ -237,15 +249,21 @@ def _unknown_axis(error: KeyError, axes: list[str]) -> str:
 
 
 def evaluate(traced: Traced, arrays: list[Array], lanes: dict[str, Array]) -> dict[str, Array]:
-    """Results and derivatives of points side by side."""
+    """Results and derivatives of points side by side; of one point without a batch."""
     function, axes = traced.static.build(arrays), list(traced.axes)
-    batched = jax.vmap(lambda point: _named(function(point), axes))
+
+    def one(point: dict[str, Array]) -> dict[str, Array]:
+        return _named(function(point), axes)
+
+    alone = all(column.shape == (1,) for column in lanes.values())
+    computed, points = (one, {name: column[0] for name, column in lanes.items()}) if alone else (jax.vmap(one), lanes)
     if traced.mode is None:
-        values = batched(lanes)
+        values = computed(points)
     else:
-        values, slopes = value_and_jacobian(batched, lanes, traced.mode, of=traced.slopes)
+        values, slopes = value_and_jacobian(computed, points, traced.mode, of=traced.slopes)
         values |= {d: jnp.stack([slopes[name][axis] for axis in axes], axis=-1) for name, d in traced.slopes.items()}
-    return {name: values[name].astype(result.dtype) for name, result in traced.results.items()}
+    stored = {name: values[name].astype(result.dtype) for name, result in traced.results.items()}
+    return {name: value[None] for name, value in stored.items()} if alone else stored
 
 
 def _stored(dtype: object) -> np.dtype:

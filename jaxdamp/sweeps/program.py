@@ -124,11 +124,11 @@ class Program:
 
 
 def prepare(
-    traced: Traced, count: int, asked: int | None, devices: object, lanes: int | None, *, printed: bool = False
+    traced: Traced, count: int, asked: int | None, devices: object, lanes: int | None, *, quickly: bool = False
 ) -> Program:
     """Choose devices and chunk, and compile; a chunk that nobody asked for is made to fit into the memory.
 
-    What is left beside a printed loop, or of few points, is compiled with little optimisation.
+    Of few points, and where `quickly` asks for it, the program is compiled with little optimisation.
     """
     mesh = Mesh(np.array(choose_devices(devices)), ("points",))
     fixed = asked is not None
@@ -139,7 +139,7 @@ def prepare(
     chunk = min(wanted, each if fixed else 2 ** (each - 1).bit_length())
     free = free_memory(mesh)
     while True:
-        program = with_chunk(traced, mesh, chunk, 1 if printed or count <= FEW else None)
+        program = with_chunk(traced, mesh, chunk, 1 if quickly or count <= FEW else None)
         if fixed or chunk == 1:
             return program
         size = program.run.memory_analysis()

@@ -19,6 +19,7 @@ from jaxdamp.sweeps.function import (
     HasLanes,
     HasPrinted,
     HasReach,
+    HasSequence,
     HasSideBySide,
     HasUnits,
     PointFunction,
@@ -181,10 +182,16 @@ class Computation:
         return {name: value for name, value in vars(self).items() if name not in ("function", "traced")}
 
     @functools.cached_property
+    def is_sequence(self) -> bool:
+        """Whether the points are computed one after the other: so few that most of the time is that of compiling."""
+        few = isinstance(self.given, HasSequence) and self.points.count <= self.given.sequential_points
+        return few and self._chunk is None and choose_devices(self._devices)[0].platform == "cpu"
+
+    @functools.cached_property
     def function(self) -> PointFunction:
         """The form of the function that is compiled."""
         function = self.given.reaching(_spread(self.points)) if isinstance(self.given, HasReach) else self.given
-        return function.side_by_side() if isinstance(function, HasSideBySide) else function
+        return function.side_by_side() if isinstance(function, HasSideBySide) and not self.is_sequence else function
 
     @functools.cached_property
     def traced(self) -> Traced:
@@ -206,13 +213,14 @@ class Computation:
         return bool(np.all(reasons != ""))
 
     def runner(self, count: int) -> Runner:
-        """Runs calls of about so many points, by a printed loop if there is one: as quick to compile, and faster.
+        """Runs calls of about so many points: of few one after the other, of many by a printed loop if there is one.
 
         A long sweep compares it with that of XLA, as other work on the machine may turn that round.
         """
 
         def compiled() -> Program:
-            return prepare(self.traced, count, self._chunk, self._devices, _lanes(self.function))
+            chunk = 1 if self.is_sequence else self._chunk
+            return prepare(self.traced, count, chunk, self._devices, _lanes(self.function), quickly=self.is_sequence)
 
         printed = self._printed(count)
         return Runner(compiled(), self.points) if printed is None else Runner(printed, self.points, compiled)
@@ -220,8 +228,10 @@ class Computation:
     def _printed(self, count: int) -> Program | None:
         """The program with its loop printed as C, if the function has one that this machine can compile."""
         function, traced = self.function, self.traced
-        printed = function.printed_side_by_side() if isinstance(function, HasPrinted) else None
-        if printed is None or traced.mode is not None:
+        if self.is_sequence or traced.mode is not None or not isinstance(function, HasPrinted):
+            return None
+        printed = function.printed_side_by_side()
+        if printed is None:
             return None
         try:
             with (
@@ -229,7 +239,7 @@ class Computation:
                 warnings.catch_warnings(action="ignore"),  # of axes, which were given before
             ):
                 printed_trace = trace(printed, list(traced.axes), False)._replace(fingerprint=traced.fingerprint)
-                return prepare(printed_trace, count, self._chunk, self._devices, _lanes(printed), printed=True)
+                return prepare(printed_trace, count, self._chunk, self._devices, _lanes(printed), quickly=True)
         except NotImplementedError as error:
             if _of_machine(error):
                 warn(f"{error} This sweep goes on with the loop of XLA.")

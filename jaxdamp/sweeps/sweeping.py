@@ -100,9 +100,10 @@ def sweep(
             numbers, or arrays of fixed shape. An equinox module that is called so is compiled once for all values of
             its arrays; arrays that a plain function closes over are compiled in. It may say more of itself
             (`sweeps.SweepFunction`): `units` of results and axes, which label the results; `lanes`, the number of
-            points that are computed side by side on a CPU; `derivatives`, the modes that pass; `reaching(columns)` and
-            `side_by_side()`, forms that are compiled in its place, for these values of the axes and for many points;
-            `out_of_domain(columns)`, a text for each of many points, empty for those that can be computed.
+            points that are computed side by side on a CPU; `sequential_points`, up to how many it has sooner one after
+            the other; `derivatives`, the modes that pass; `reaching(columns)` and `side_by_side()`, forms that are
+            compiled in its place, for these values of the axes and for many points; `out_of_domain(columns)`, a text
+            for each of many points, empty for those that can be computed.
         over: values for each axis, whose every combination is taken (the last axis runs fastest); or
             `jaxdamp.sweeps.points`, `random` or `sobol`. The function gets them as floating numbers.
         summary: what is kept instead of all results: statistics, and the histograms, best points and Pareto set that a
@@ -113,7 +114,7 @@ def sweep(
 
     Returns:
         The results by name with the axes as dimensions (for a list, along `point`). Of a `Ride`, `attrs["loop"]` says
-        by what its loop was compiled at the end: XLA, or the C compiler where a long sweep found that to be faster; the
+        by what its loop was compiled at the end: XLA, which drives few cars one after the other, or the C compiler; the
         numbers are the same to rounding. From a `.zarr` store they are read when they are asked for, and
         `attrs["points_done"]` counts those that are done; each process chooses its loop, which is not noted. With
         `summary`, a `SweepSummary` of the points that are done.

@@ -56,7 +56,7 @@ def test_the_numbers_of_a_policy_with_a_filter_are_swept():
     """Its states, which begin at zero, were no arrays to the loop that is printed as C, and the sweep failed."""
     axes = {"policy.low": [0.1, 1.0], "policy.high": [5.0]}
     ride = Ride(Controlled(quarter(), BandSkyhook(3000.0)), ROAD, metrics=METRICS[:1], duration=0.5)
-    data = jaxdamp.sweep(ride, axes)
+    data = jaxdamp.sweep(ride, axes, chunk=2)
     for low in axes["policy.low"]:
         alone = ride({"policy.low": low, "policy.high": 5.0})[METRICS[0]]
         assert float(data[METRICS[0]].sel({"policy.low": low})[0]) == pytest.approx(float(alone), rel=1e-9)
@@ -65,7 +65,7 @@ def test_the_numbers_of_a_policy_with_a_filter_are_swept():
 def test_simulation_ride_sweep_and_printed_loop_give_the_same_numbers(car, ride, response):
     gains = np.array([3000.0, 1500.0])
     printed = Ride(car, ROAD, metrics=METRICS, duration=2.0, engine=simulation.Exponential(printed=True))
-    one, swept = ride({"policy.gain": 3000.0}), jaxdamp.sweep(ride, {"policy.gain": gains})
+    one, swept = ride({"policy.gain": 3000.0}), jaxdamp.sweep(ride, {"policy.gain": gains}, chunk=2)
     in_c = jax.vmap(lambda gain: printed({"policy.gain": gain}))(gains)
     of_response = response.metrics(METRICS)
     for name in METRICS:

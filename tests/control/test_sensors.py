@@ -176,7 +176,7 @@ def test_simulation_ride_sweep_and_printed_loop_have_the_same_noise(car, ride):
     steps = np.diff(response["damper_command"])
     assert steps.max() == pytest.approx(20.0 * DT, rel=1e-9) and steps.min() == pytest.approx(-60.0 * DT, rel=1e-9)
     seeds, gains = np.array([3.0, 4.0, 5.0]), np.array([3000.0, 1000.0])
-    swept = jaxdamp.sweep(ride, {"sensors.seed": seeds})
+    swept = jaxdamp.sweep(ride, {"sensors.seed": seeds}, chunk=3)
     printed = Ride(car, ROAD, metrics=METRICS, duration=1.0, engine=simulation.Exponential(printed=True))
     in_c = jax.vmap(lambda gain: printed({"policy.gain": gain}))(gains)
     one = ride()
@@ -241,7 +241,7 @@ def test_dampers_have_sensors_of_their_own():
 @pytest.mark.slow
 def test_a_half_car_alone_and_in_a_sweep_has_the_same_noise():
     ride = Ride(Controlled(HALF, Skyhook(), 4e-3, sensors=NOISY, rate_limit=RateLimit(20.0, 60.0)), ROAD, duration=1.0)
-    one, swept = ride(), jaxdamp.sweep(ride, {"policy.gain": np.array([3000.0, 2000.0])})
+    one, swept = ride(), jaxdamp.sweep(ride, {"policy.gain": np.array([3000.0, 2000.0])}, chunk=2)
     assert ride.layout is not ride.side_by_side().layout
     for name, value in one.items():
         np.testing.assert_allclose(swept[name][0], value, rtol=1e-8, atol=1e-12)

@@ -5,8 +5,11 @@ import pytest
 import jaxdamp
 from jaxdamp import roads, vehicles
 from jaxdamp.parameters import replace
+from jaxdamp.simulation import Exponential
 from jaxdamp.sweeps import SweepFunction
-from jaxdamp.sweeps.function import HasDerivatives, HasDomain, HasLanes, HasSideBySide, HasUnits
+from jaxdamp.sweeps.axes import as_points
+from jaxdamp.sweeps.function import HasDerivatives, HasDomain, HasLanes, HasSequence, HasSideBySide, HasUnits
+from jaxdamp.sweeps.running import Computation
 
 
 pytestmark = pytest.mark.users_flags
@@ -36,7 +39,8 @@ def test_a_simulated_quarter_car(tmp_path):
 def test_a_ride_is_swept_with_its_units():
     car, road = vehicles.presets.quarter_car_000(), roads.step(0.02, start=0.05)
     ride = jaxdamp.Ride(car, road, metrics=["rms_sprung_acceleration", "working_space_rms"], duration=0.2, dt=2e-3)
-    data = jaxdamp.sweep(ride, {"rate": [1000.0, 3000.0], "sprung_mass": [1000.0, 1200.0, 1400.0]}, gradients=True)
+    axes = {"rate": [1000.0, 3000.0], "sprung_mass": [1000.0, 1200.0, 1400.0]}
+    data = jaxdamp.sweep(ride, axes, gradients=True, chunk=6)
     assert data["rate"].attrs["units"] == "N s/m" and data["rms_sprung_acceleration"].attrs["units"] == "m/s^2"
     alone = ride({"damper.rate": 3000.0, "sprung_mass": 1400.0})
     for name, value in alone.items():  # other code is compiled for cars side by side
@@ -50,9 +54,26 @@ def test_a_ride_says_all_that_a_sweep_asks():
     function: SweepFunction = jaxdamp.Ride(
         vehicles.presets.quarter_car_000(), roads.step(0.02, start=0.05), duration=0.1
     )
-    asked = (HasUnits, HasLanes, HasDerivatives, HasSideBySide, HasDomain)
+    asked = (HasUnits, HasLanes, HasDerivatives, HasSideBySide, HasSequence, HasDomain)
     assert all(isinstance(function, protocol) for protocol in asked)
     assert not any(isinstance(lambda point: point, protocol) for protocol in asked)
+
+
+def test_few_cars_are_driven_one_after_the_other(monkeypatch):
+    """With the numbers of a single ride to the last bit; as many as take long, or a chunk of one's own, side by side."""
+    car, road, (name,) = vehicles.presets.quarter_car_000(), roads.step(0.02, start=0.05), ["working_space_rms"]
+    ride, rates = jaxdamp.Ride(car, road, metrics=[name], duration=0.1, dt=2e-3), np.array([1000.0, 2000.0, 3000.0])
+    monkeypatch.setattr("jaxdamp.simulation.ride.SEQUENCE", 3 * 51)
+    assert ride.sequential_points == 3
+    alone = [float(ride({"damper.rate": rate})[name]) for rate in rates]
+    np.testing.assert_array_equal(jaxdamp.sweep(ride, {"damper.rate": rates})[name], alone)
+    np.testing.assert_allclose(jaxdamp.sweep(ride, {"damper.rate": rates}, chunk=2)[name], alone, rtol=1e-11)
+    of_three, of_four = (as_points({"damper.rate": 1000.0 * np.arange(1.0, size)}) for size in (4.0, 5.0))
+    assert Computation(ride, of_three).is_sequence and not Computation(ride, of_four).is_sequence
+    assert not Computation(ride, of_three, chunk=2).is_sequence
+    printed = jaxdamp.Ride(car, road, metrics=[name], duration=0.1, dt=2e-3, engine=Exponential(printed=True))
+    white = jaxdamp.Ride(car, roads.white("C", 20.0), metrics=["rms_dynamic_tyre_load"])
+    assert printed.sequential_points == white.sequential_points == 0
 
 
 def test_cars_that_cannot_exist_fail_with_a_reason():

@@ -88,8 +88,8 @@ def test_a_chunk_that_does_not_fit_is_made_smaller(monkeypatch):
     chunks = []
     original = running.prepare
 
-    def prepare(*arguments):
-        program = original(*arguments)
+    def prepare(*arguments, **options):
+        program = original(*arguments, **options)
         chunks.append(program.layout.chunk)
         return program
 

@@ -77,7 +77,7 @@ def test_a_loop_that_the_machine_does_not_load_is_left_to_xla_with_a_word(monkey
     monkeypatch.setattr(_native, "_compiled", unloadable)
     road = roads.cosine_bump(0.05, start=0.1, length=1.0, speed=10.0)
     ride = Ride(vehicles.presets.quarter_car_000(), road, metrics=["peak_sprung_acceleration"], duration=0.3)
-    computation = running.Computation(ride, points({"damper.rate": np.array([1000.0, 2000.0])}))
+    computation = running.Computation(ride, points({"damper.rate": np.array([1000.0, 2000.0])}), chunk=2)
     with pytest.warns(UserWarning, match="failed to map .* TMPDIR. This sweep goes on with the loop of XLA"):
         assert computation._printed(2) is None
 
