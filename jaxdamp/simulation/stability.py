@@ -20,7 +20,7 @@ from jaxdamp.vehicles import AbstractVehicle, System
 
 
 LARGEST = 0.5  # of the share below; the corrected step is stable up to 1
-STIFF = 0.1  # of the share through the travel alone, from which on two steps are taken: they err a fifth as much
+STIFF = 0.05  # of the share through the travel alone, from which on two steps are taken: they err a tenth as much
 MOST = 64
 HEUN = 1.0  # largest rate of a state times the step for the explicit step of slow states, which is stable up to 2
 _VELOCITIES = np.concatenate([-np.geomspace(3.0, 1e-4, 14), [0.0], np.geomspace(1e-4, 3.0, 14)])  # m/s

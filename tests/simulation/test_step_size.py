@@ -126,9 +126,9 @@ def stated(caught):
     ("law", "counts"),
     [
         pytest.param(dampers.MonoTube.reference(), [1, 2, 2, 4, 8], marks=pytest.mark.slow),
-        (dampers.ModifiedBoucWen.prototype(1.5), [1, 2, 2, 4, 8]),
+        (dampers.ModifiedBoucWen.prototype(1.5), [2, 2, 2, 4, 8]),
         (dampers.Dahl(4e6, 40.0), [1, 1, 2, 2, 3]),
-        (LUGRE, [1, 1, 1, 1, 1]),
+        (LUGRE, [1, 1, 1, 1, 2]),
     ],
     ids=lambda value: type(value).__name__,
 )
@@ -170,9 +170,17 @@ def test_a_stop_that_a_wheel_hits_hard_is_a_warning():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("law", [dampers.MonoTube.reference(), dampers.TwinTube.reference()], ids=["mono", "twin"])
+@pytest.mark.parametrize(
+    "law",
+    [
+        dampers.MonoTube.reference(),
+        dampers.TwinTube.reference(),
+        dampers.MotionRatio(dampers.MonoTube.reference(), 0.8),
+    ],
+    ids=["mono", "twin", "mono at a lever"],
+)
 def test_compressible_oil_is_within_half_a_percent_at_the_default_step(law):
-    """1.8 and 2.3 % in steps that are not divided."""
+    """1.8, 2.3 and 1.8 % in steps that are not divided."""
     car, rough = QuarterCar(350.0, 40.0, 22e3, 210e3, law), roads.iso8608("E", 25.0, 6.0, seed=2)
     found, fine = (simulate(car, rough, duration=2.0, dt=dt)["sprung_acceleration"] for dt in (1e-3, 1.25e-4))
     assert np.sqrt(np.mean((found - fine[::8]) ** 2)) < 5e-3 * np.sqrt(np.mean(fine**2))
