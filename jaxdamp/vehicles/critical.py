@@ -12,9 +12,11 @@ from jaxdamp._quickly import compiled_quickly
 from jaxdamp._traced import behind
 from jaxdamp._types import Scalar
 from jaxdamp.vehicles.base import AbstractVehicle
+from jaxdamp.vehicles.equilibrium import rest_position
 from jaxdamp.vehicles.frame import STANDARD_GRAVITY, Frame
 from jaxdamp.vehicles.parts import Link, prefixed
 from jaxdamp.vehicles.port_form import Ports
+from jaxdamp.vehicles.system import System
 
 
 class CriticalDamping(NamedTuple):
@@ -34,8 +36,9 @@ def critical_damping(vehicle: AbstractVehicle) -> dict[str, CriticalDamping]:
 
     Body and wheel are taken for themselves, as single masses: the body with the mass that the wheel carries at rest,
     W/g − m_w for the static load W of the wheel; the wheel with the body at rest. Springs include laws that act by the
-    stroke, at rest, and are those at the wheel, as is the rate of the damper: with a `MotionRatio` that of the whole
-    law. `modes` has the damping ratios of the coupled motions. Differentiable in every parameter.
+    stroke, with their slope in the static equilibrium, and are those at the wheel, as is the rate of the damper: with
+    a `MotionRatio` that of the whole law. `modes` has the damping ratios of the coupled motions. Differentiable in
+    every parameter.
 
     Dampers that are not the only link between a body and a wheel (of a solid axle, a cab, a seat) are left out; the
     main body itself is no wheel, also where it stands on its tyres (`TrackedHull`).
@@ -49,8 +52,8 @@ def critical_damping(vehicle: AbstractVehicle) -> dict[str, CriticalDamping]:
     (16971, 11832)
     """
     check_module("vehicle", vehicle, (AbstractVehicle,), "critical_damping(vehicle)")
-    frame = vehicle.frame()
-    loads, springs = vehicle.system().static_loads, _springs(frame)  # which is compiled already
+    frame, system = vehicle.frame(), vehicle.system()
+    loads, springs = system.static_loads, _springs(frame, system)
     on_road = [{name for name in wheel.point.terms if name[:2] == "z_"} for wheel in frame.wheels]
     ends = [_ends(link, set().union(*on_road)) for link in frame.links]
     lower = [end for _, end in ends]
@@ -70,19 +73,19 @@ def critical_damping(vehicle: AbstractVehicle) -> dict[str, CriticalDamping]:
     return pairs
 
 
-def _springs(frame: Frame) -> list[Scalar]:
-    """The stiffness of each link, with that of its laws at rest [N/m]."""
-    laws = [element.together for part in (*frame.links, *frame.wheels) for element in part.elements]
-    slopes = jnp.zeros(len(laws))
-    if any(law.traits().stroke_dependent_at_rest for law in laws):
-        slopes = _stiffness(Ports(laws), slopes)
+def _springs(frame: Frame, system: System) -> list[Scalar]:
+    """The stiffness of each link, with that of its laws in the static equilibrium [N/m]."""
     ends = np.cumsum([0, *(len(link.elements) for link in frame.links)])
+    slopes = jnp.zeros(ends[-1])
+    if any(law.traits().stroke_dependent_at_rest for law in system.laws[: ends[-1]]):
+        slopes = _stiffness(system)
     return [link.stiffness + jnp.sum(slopes[ends[i] : ends[i + 1]]) for i, link in enumerate(frame.links)]
 
 
 @compiled_quickly
-def _stiffness(ports: Ports, deflection: Float[Array, " ports"]) -> Float[Array, " ports"]:
-    return ports.stiffness_and_damping(deflection)[0]
+def _stiffness(system: System) -> Float[Array, " ports"]:
+    position = rest_position(system, jnp.zeros(system.form.road_stiffness.shape[1]))
+    return Ports(system.laws).stiffness_and_damping(system.form.ports @ position)[0]
 
 
 def _ends(link: Link, on_road: set[str]) -> tuple[str, str]:

@@ -51,6 +51,13 @@ def test_a_spring_among_the_laws_counts():
     np.testing.assert_allclose(*(np.array(pair["damper"]) for pair in pairs), rtol=1e-12)
 
 
+def test_an_air_spring_counts_where_the_car_stands():
+    """Its charge raises the car, where it is softer: with the slope at zero stroke the ratio is 6 % lower."""
+    car = QuarterCar(300.0, 1e-3, 18e3, 1e10, LAW, extra_spring=dampers.GasSpring(3e5, 1e-3, 5e-3))
+    body = critical_damping(car)["damper"].body
+    assert 900.0 / float(body) == pytest.approx(modes(car).damping_ratio[0], rel=1e-4)
+
+
 def test_each_wheel_carries_its_share():
     front, rear = (critical_damping(half_car_002())[f"{end}_damper"] for end in ("front", "rear"))
     np.testing.assert_allclose(front.body, 2.0 * np.sqrt(23.5e3 * 580.0 * 1.5 / 2.5), rtol=1e-9)
