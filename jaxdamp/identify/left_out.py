@@ -66,6 +66,7 @@ class _Named(NamedTuple):
 
     effect: Pattern
     sizes: np.ndarray
+    said: np.ndarray  # sizes as they stand in words
     share: float  # of the squared residual
     rest: np.ndarray
     span: np.ndarray  # with the effect
@@ -73,7 +74,7 @@ class _Named(NamedTuple):
     @property
     def words(self) -> str:
         """Share and size."""
-        return f"{_percent(self.share)} % {{}} like {self.effect.words(self.sizes)}"
+        return f"{_percent(self.share)} % {{}} like {self.effect.words(self.said)}"
 
 
 class LeftOut(NamedTuple):
@@ -142,7 +143,7 @@ def _of_the_law(named: Sequence[_Named], left: float, memoryless: bool) -> str:
     alike = f" (of the squared residual {', '.join(parts)})" * bool(parts)
     if named and named[-1].effect.name in OF_LAW:
         effect = named[-1].effect
-        misses = f"By the residual, the law misses {effect.words(named[-1].sizes)}{alike}"
+        misses = f"By the residual, the law misses {effect.words(named[-1].said)}{alike}"
         if memoryless:
             return f"{misses}: {effect.remedy}. {COMPARE_LAWS}"
         of_memory = effect.remedy if effect.name == "hysteresis" else ""
@@ -262,7 +263,12 @@ def _explained(effect: Pattern, span: np.ndarray, residual: np.ndarray, squares:
     if not inside.size or not (effect.signed or np.all(sizes > 0)):
         return None
     share = float(inside @ inside) / squares
-    return _Named(effect, sizes, share, residual - basis @ inside, np.concatenate([span, basis], axis=1))
+    said = sizes
+    if effect.of_force:  # the force that the law has after the effect is told from it, not the one fitted with it
+        force, changed = effect.signals[:, 0], effect.signals @ sizes
+        without = np.where(force != 0.0, force - span @ (span.T @ changed), 0.0)
+        said = np.atleast_1d(float(changed @ without) / float(without @ without))
+    return _Named(effect, sizes, said, share, residual - basis @ inside, np.concatenate([span, basis], axis=1))
 
 
 def _mains(

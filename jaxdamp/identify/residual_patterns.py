@@ -54,6 +54,7 @@ class Pattern(NamedTuple):
     at_rest: np.ndarray | None = (
         None  # force [N] at velocity zero for a unit of each number; None where it says nothing
     )
+    of_force: bool = False  # whether its number is relative to the force
 
 
 class Motion(NamedTuple):
@@ -156,8 +157,8 @@ def _gains(problem: Problem, records: Sequence[Record]) -> list[Pattern]:
         def words(sizes: np.ndarray, name: str = problem.runs[number].name) -> str:
             return f"a gain of {1.0 + float(sizes[0]):.3g} in {name}"
 
-        remedy = "was a range or a setting changed? Leave the record out, or fit it apart"
-        patterns.append(Pattern("gain", values, True, words, remedy))
+        remedy = "was a range, a unit or a setting changed? Leave the record out, or fit it apart"
+        patterns.append(Pattern("gain", values, True, words, remedy, of_force=True))
     return patterns
 
 

@@ -44,6 +44,16 @@ def test_a_delay_that_the_lag_of_a_law_imitates_is_not_denied():
     assert identify.fit(dampers.Bilinear(2000.0, 2000.0), runs, rig="delay").rmse < lagging.rmse
 
 
+@pytest.mark.parametrize("number", [0, 2])
+def test_the_gain_of_a_record_is_relative_to_the_force_without_it(number):
+    """One of four files in lbf that are said to be N: gains of -0.03 and 0.19 were named."""
+    tests = [bench.SineTest(0.02, f) for f in (0.5, 1.5, 4.0, 6.5)]
+    runs = list(bench.VirtualDyno(dampers.Bilinear(2600.0, 1200.0), 400.0, force_noise=5.0).run(tests))
+    runs[number] = dataclasses.replace(runs[number], force=0.225 * runs[number].force)
+    said = identify.fit(dampers.Bilinear, runs).main_warnings
+    assert any(f"a gain of 0.225 in {runs[number].name}" in text for text in said)
+
+
 def test_a_law_with_memory_is_not_told_to_become_one_without():
     """Its residual has the shape of a curve; a table without hysteresis was proposed, worse on measured records."""
     tests = [bench.SineTest(a, f, cycles=8) for a, f in ((0.02, 1.0), (0.01, 4.0))]
