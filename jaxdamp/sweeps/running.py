@@ -191,7 +191,9 @@ class Computation:
     def function(self) -> PointFunction:
         """The form of the function that is compiled."""
         function = self.given.reaching(_spread(self.points)) if isinstance(self.given, HasReach) else self.given
-        return function.side_by_side() if isinstance(function, HasSideBySide) and not self.is_sequence else function
+        if self.is_sequence or not isinstance(function, HasSideBySide):
+            return function
+        return function.side_by_side()
 
     @functools.cached_property
     def traced(self) -> Traced:

@@ -60,7 +60,7 @@ def test_a_ride_says_all_that_a_sweep_asks():
 
 
 def test_few_cars_are_driven_one_after_the_other(monkeypatch):
-    """With the numbers of a single ride to the last bit; as many as take long, or a chunk of one's own, side by side."""
+    """With the numbers of a single ride to the last bit; many, or with a chunk of one's own, side by side."""
     car, road, (name,) = vehicles.presets.quarter_car_000(), roads.step(0.02, start=0.05), ["working_space_rms"]
     ride, rates = jaxdamp.Ride(car, road, metrics=[name], duration=0.1, dt=2e-3), np.array([1000.0, 2000.0, 3000.0])
     monkeypatch.setattr("jaxdamp.simulation.ride.SEQUENCE", 3 * 51)
