@@ -59,6 +59,7 @@ from jaxdamp.parameters import get, modules_inside, parameters, with_values
 MOST_WARNINGS = 5  # that are shown at a terminal
 _REMEDY = "Try another start, bounds, or fewer free parameters."
 ALIKE = 0.1  # of their mean, by which values of records may differ to count as one
+UNLIKE = 1.5  # times the stated noise, or a part of it, from which the error of a fit is another one
 DRAWS = 6  # perturbations, each with both signs
 
 
@@ -95,6 +96,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     notes = on_status(best, estimates.unsettled, _REMEDY) + [
         f"The records {words}. Check the prior, or give it a wider one." for words in against
     ]
+    notes += [] if problem.robust is not None else _against_stated(rmse, force_noise)
     pooled = all(p.startswith("rig.") for p in problem.per_record) and not stated_values(model, problem.runs)
     on_records = (
         *notes_on(model, problem.fitted_to, pooled=pooled),
@@ -191,6 +193,17 @@ def fitted_models(problem: Problem, values: np.ndarray) -> tuple[list[Model], Mo
     covered = covered_range(problem.fitted_to, fitted or built)
     joint = with_means(built, problem.per_record) if by_record else built
     return [with_range(model, covered) for model in models], with_range(joint, covered)
+
+
+def _against_stated(rmse: float, force_noise: float | None) -> list[str]:
+    """A sentence where the error of the fit [N] is not the stated noise [N], if there is one."""
+    if force_noise is None or 1.0 / UNLIKE < rmse / force_noise < UNLIKE:
+        return []
+    cause = "Is it too small, or does the law miss something?" if rmse > force_noise else "Is it too large?"
+    return [
+        f"The error of {rmse:.3g} N is {rmse / force_noise:.2g} times the stated noise of {force_noise:.3g} N, which"
+        f" alone the standard errors count. {cause} Without `force_noise`, the residual counts."
+    ]
 
 
 def _averaged(problem: Problem, best: SearchEnd) -> tuple[str, ...]:

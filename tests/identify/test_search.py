@@ -155,8 +155,10 @@ def test_correlated_residuals_are_said(sines):
     assert sum("the law misses" in w for w in wrong.warnings) == 1, wrong.warnings  # said once
     right = fit(BESINGER, sines(BESINGER, noise=5.0))
     assert right.warnings == ()
-    of_stated_noise = fit(Linear, sines(BESINGER, noise=5.0), force_noise=5.0).warnings
-    assert ["the law misses the shape of the damper's curve" in warning for warning in of_stated_noise] == [True]
+    stated, shape = fit(Linear, sines(BESINGER, noise=5.0), force_noise=5.0).warnings
+    assert "the law misses the shape of the damper's curve" in shape
+    assert f"{wrong.rmse / 5.0:.2g} times the stated noise of 5 N" in stated  # which was not said
+    assert "Is it too large?" in fit(BESINGER, sines(BESINGER, noise=5.0), force_noise=20.0).warnings[0]
 
 
 def test_a_lag_that_is_not_there_ends_at_zero(sines):
