@@ -15,7 +15,7 @@ from jaxdamp._tables import Column, Contents, Table, plain, typeset_unit, with_u
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import MetricValues
 from jaxdamp.parameters import FreeParameters
-from jaxdamp.tune.limits import percentage
+from jaxdamp.tune.limits import amount, percentage
 from jaxdamp.tune.measuring import Measurement
 from jaxdamp.tune.result import V
 from jaxdamp.tune.verdict import relative_change
@@ -170,12 +170,12 @@ class ParetoFront(AbstractResult, Generic[V]):
     def summary(self) -> str:
         """The range of each objective, and the knee, in a sentence; or that no design meets the limits."""
         ends = [
-            f"{name} {self.values[name].min():.4g} to {self.values[name].max():.4g} {self.units[name]}".rstrip()
+            f"{name} {amount(self.values[name].max(), self.units[name], self.values[name].min(), link=' to ')}"
             for name in self.names
         ]
         if self.status is Status.LIMIT_NOT_MET:
             return f"No design within the limits; the nearest one: {' '.join(self.warnings[:1])} {'; '.join(ends)}."
-        knee = ", ".join(f"{name} {self.values[name][self.knee]:.4g}" for name in self.names)
+        knee = ", ".join(f"{name} {amount(self.values[name][self.knee], self.units[name])}" for name in self.names)
         changes = [relative_change(self.before[n], float(self.values[n][self.knee])) for n in self.names]
         from_start = ["from 0" if change is None else percentage(change) for change in changes]
         return (

@@ -25,6 +25,7 @@ from jaxdamp.parameters import (
     parameters,
     weight,
 )
+from jaxdamp.tune.limits import amount
 from jaxdamp.tune.shape import curve_velocities
 
 
@@ -130,7 +131,7 @@ class SearchRange:
         left = [c for c, origin in zip(changes, self.origin, strict=True) if "zero" in origin and c.after != c.before]
         if not left:
             return []
-        ends = [f"{c.name} ended at {c.after:.4g} {c.unit}".rstrip() for c in left[:MOST_NAMED]]
+        ends = [f"{c.name} ended at {amount(c.after, c.unit)}" for c in left[:MOST_NAMED]]
         more = f" and {len(left) - MOST_NAMED} more" * (len(left) > MOST_NAMED)
         bounds = f"`bounds={{{left[0].name.partition('[')[0]!r}: (lower, upper)}}`"
         return [f"{', '.join(ends)}{more}: zero, where a search starts, gives no range in proportion. Pass {bounds}."]

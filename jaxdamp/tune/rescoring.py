@@ -135,7 +135,9 @@ class Rescore(AbstractResult):
         before, after = self.before[self.metric], self.after[self.metric]
         head = f"On {np.count_nonzero(after < before)} of {self.roads} roads {self.metric} decreases"
         if self.metric not in self.in_percent:
-            return f"{head}, from {before.mean():.4g} to {amount(after.mean(), self.units[self.metric])} on average."
+            return (
+                f"{head}, from {amount(after.mean(), self.units[self.metric], before.mean(), link=' to ')} on average."
+            )
         change = 100 * self.change(self.metric)
         mean = percentage(change.mean(), 100 * self.half_width(self.metric))
         return f"{head}; it changes by {mean} on average ({round(change.min()):+.6g} to {round(change.max()):+.6g} %)."

@@ -15,7 +15,7 @@ from jaxdamp._status import Status
 from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, typeset_unit, with_unit
 from jaxdamp._types import Figure
 from jaxdamp.tune.combinations import Combinations
-from jaxdamp.tune.limits import LimitRange, percentage, written
+from jaxdamp.tune.limits import LimitRange, amount, percentage, written
 from jaxdamp.tune.objective import Objective, Targets
 from jaxdamp.tune.ranges import Change
 from jaxdamp.tune.rescoring import Rescore, Spectrum, spectra
@@ -172,7 +172,7 @@ class TuneResult(AbstractResult, Generic[V]):
         else:
             state = "an optimum" if self.converged else "not an optimum"
             parts = [f"{state} after {len(self.history)} steps", *stops, *[inside] * bool(inside)]
-        text = f"{self.metric} {before:.4g} -> {after:.4g}{unit and ' '}{unit}{share}: {', '.join(parts)}."
+        text = f"{self.metric} {amount(after, unit, before)}{share}: {', '.join(parts)}."
         return " ".join(filter(None, (f"{text}{self._extremes}", self.relaxation)))
 
     @property

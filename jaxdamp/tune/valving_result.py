@@ -11,6 +11,7 @@ from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Contents, Table, with_unit
 from jaxdamp.dampers import MonoTube, TwinTube
+from jaxdamp.tune.limits import amount
 
 
 class ValveParameter(NamedTuple):
@@ -95,7 +96,7 @@ class ValvingResult(AbstractResult):
         """The error, the bounds reached and the parts out of reach, in sentences."""
         verdict = "reached" if self.feasible else "not reached; this is the nearest force within the bounds"
         texts = [f"The target is {verdict}: error {self.rmse:.3g} N ({self.error_percent:.2g} %)."]
-        texts += [f"{p.name} is {p.note}, {p.value:.4g} {p.unit}." for p in self.parameters if p.note]
+        texts += [f"{p.name} is {p.note}, {amount(p.value, p.unit)}." for p in self.parameters if p.note]
         return " ".join([*texts, *self.warnings])
 
     @property

@@ -146,7 +146,7 @@ def _change(result: "TuneResult[AbstractVehicle]") -> tuple[float, str]:
 
 
 def _from_to(result: "TuneResult[AbstractVehicle]", name: str, before: float, after: float) -> str:
-    return f"{before:.4g} -> {amount(after, result.units[name])}"
+    return amount(after, result.units[name], before)
 
 
 def _price(result: "TuneResult[AbstractVehicle]") -> tuple[float, str]:
@@ -207,7 +207,7 @@ def bound_notes(space: SearchRange, changes: tuple[Change, ...]) -> list[str]:
             groups.setdefault(origin["upper" in change.note], []).append(change)
     notes = space.notes_without_range(changes)
     for origin, group in groups.items():
-        ends = [f"{c.name} ended {c.note}, {c.after:.5g} {c.unit}".rstrip() for c in group]
+        ends = [f"{c.name} ended {c.note}, {amount(c.after, c.unit)}" for c in group]
         if len(group) > MOST_NAMED:
             counts = Counter(c.name.partition("[")[0] for c in group)
             of = ", ".join(f"{count} of {path}" if count > 1 else path for path, count in counts.items())
@@ -242,8 +242,8 @@ def missed_notes(short: Sequence[Limit], values: Mapping[str, float], changes: S
     bound = f" The search is held by the bounds of {', '.join(bounds)}." if bounds else ""
     together = f" Not met together: {', '.join(worst)}." if len(worst) > 1 else ""
     return [
-        f"The limit {limit.name} {limit.nearer(values[limit.name])} is not met: {values[limit.name]:.4g}. Relax it, or "
-        f"free more.{together}{bound}"
+        f"The limit {limit.name} {limit.nearer(values[limit.name])} is not met: "
+        f"{amount(values[limit.name], limit.unit)}. Relax it, or free more.{together}{bound}"
         for limit in worst.values()
     ]
 
@@ -280,9 +280,7 @@ def active_words(
     for text, (first, *others) in groups.items():
         more = f" and {len(others)} more places" if others else ""
         words.append(f"{text},{first}{more}" if first else text)
-    words += [
-        f"{change.name} {change.note}, {change.after:.4g} {change.unit}".rstrip() for change in changes if change.note
-    ]
+    words += [f"{change.name} {change.note}, {amount(change.after, change.unit)}" for change in changes if change.note]
     rows, gaps = space.coordinates.order()
     touching = np.abs(rows @ (ended / space.unit) - gaps) < 1e-9 if gaps.size else np.zeros(0, bool)
     pairs = (np.array(space.free.names)[row != 0] for row in rows[touching])
@@ -307,9 +305,10 @@ def start_notes(attempts: Sequence["Attempt"], metric: str) -> list[str]:
 def violations(short: Sequence[Limit], values: Mapping[str, float]) -> dict[str, str]:
     """Each metric or shape beyond its limit, in words, at its worst place."""
     worst = sorted(short, key=lambda limit: limit.margin(values[limit.name]), reverse=True)
+    at = {limit.of: (limit, values[limit.name]) for limit in worst}
     return {
-        limit.of: f"{limit.name} is {values[limit.name]:.4g}, and must be {limit.nearer(values[limit.name])}"
-        for limit in worst
+        name: f"{limit.name} is {amount(value, limit.unit)}, and must be {limit.nearer(value)}"
+        for name, (limit, value) in at.items()
     }
 
 

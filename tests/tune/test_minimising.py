@@ -116,7 +116,7 @@ def test_limit_that_cannot_be_met_is_said():
         "rms_sprung_acceleration", CAR, road, limits={"working_space_peak_to_peak": 1e-3}, duration=1.0
     )
     assert not result.converged
-    assert any("working_space_peak_to_peak ≤ 0.001 m is not met" in w for w in result.warnings)
+    assert any("working_space_peak_to_peak ≤ 1 mm is not met" in w for w in result.warnings)
 
 
 def test_bounds_hold_and_are_said():

@@ -172,7 +172,7 @@ def test_a_limit_that_does_not_hold_on_fresh_roads_is_said():
 def test_a_limit_that_no_design_meets_is_named():
     front = tune.pareto([COMFORT, TYRE], CAR, ROAD, points=3, limits={TRAVEL: 0.005, COMFORT: 0.5})
     assert front.status is tune.Status.LIMIT_NOT_MET and len(front) == 1
-    assert f"The limit {TRAVEL} ≤ 0.005 m is not met: 0.009" in front.warnings[0]
+    assert f"The limit {TRAVEL} ≤ 5 mm is not met: 9." in front.warnings[0]
     assert (
         f"Not met together: {TRAVEL}, {COMFORT}. The search is held by the bounds of damper.rate." in front.warnings[0]
     )

@@ -79,7 +79,7 @@ def test_metrics_that_may_be_negative_have_no_change_in_percent() -> None:
     signed = Rescore(
         before, after, {"maximum_stroke": "m", "grip": "N"}, "maximum_stroke", frozenset(["maximum_stroke"])
     )
-    assert signed.summary == "On 2 of 2 roads maximum_stroke decreases, from 0.001005 to 0 m on average."
+    assert signed.summary == "On 2 of 2 roads maximum_stroke decreases, from 1.005 to 0 mm on average."
     assert [row["metric"] for row in signed.table().records()] == ["grip"]
     none = Rescore({"grip": np.zeros(2)}, {"grip": np.array([0.0, 1.0])}, {"grip": "N"}, "grip")
     assert none.summary == "On 0 of 2 roads grip decreases, from 0 to 0.5 N on average."

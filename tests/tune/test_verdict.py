@@ -112,11 +112,11 @@ def test_metrics_that_may_be_negative_have_no_percent():
     words |= dict(limits={MEAN: (-0.021, np.inf)}, allowed=allowed, active_limits=(MEAN,))
     words["units"] = {MEAN: "m", COMFORT: ""}
     result = TuneResult(CAR, CAR, COMFORT, before=sides[0], after=sides[1], **words)
-    assert f"limits: {MEAN} -0.021 m, at its limit" in result.summary
+    assert f"limits: {MEAN} -21 mm, at its limit" in result.summary
     assert [row["change"] for row in result.table().records()] == [None, pytest.approx(-10.0)]
     words |= dict(limits={}, allowed={}, fresh=fresh)
     lowered = TuneResult(CAR, CAR, MEAN, before=sides[0], after=sides[1], **words)
-    assert lowered.verdict.sentence.startswith(f"Better: {MEAN} -0.02 -> -0.021 m on 3 fresh roads")
+    assert lowered.verdict.sentence.startswith(f"Better: {MEAN} -20 -> -21 mm on 3 fresh roads")
 
 
 def test_what_is_maximised_gets_better_as_its_negative_falls():
@@ -148,10 +148,10 @@ def test_of_many_parameters_at_bounds_the_summary_says_how_many():
 def test_a_violated_limit_is_said_first_with_its_number():
     result = tune.minimise(COMFORT, CAR, WHITE, limits={"working_space_rms": 1e-3})
     assert list(result.violated) == ["working_space_rms"] and result.active_limits == ()
-    value = f"{result.after['working_space_rms']:.4g}"
-    assert result.summary.startswith(f"Limit not met: working_space_rms is {value}, and must be ≤ 0.001 m")
+    value = f"{1e3 * result.after['working_space_rms']:.4g} mm"
+    assert result.summary.startswith(f"Limit not met: working_space_rms is {value}, and must be ≤ 1 mm")
     (row,) = [row for row in result.table().records() if row["metric"] == "working_space_rms"]
-    assert row["note"] == "limit 0.001 m, violated" and result.verdict.outcome is Outcome.LIMIT_NOT_MET
+    assert row["note"] == "limit 1 mm, violated" and result.verdict.outcome is Outcome.LIMIT_NOT_MET
     labels = [label.get_text() for axes in result.plot().axes for label in axes.get_yticklabels()]
     assert any(label.startswith("suspension travel, RMS (LIMIT VIOLATED)") for label in labels)
 
@@ -325,10 +325,8 @@ def test_the_cheapest_relaxation_gives_one_percent():
 def test_of_limits_that_are_not_met_those_within_reach_are_said():
     """They are met, and 1 % less is not."""
     result = tune.minimise(COMFORT, CAR, WHITE, limits={"working_space_rms": 1e-3})
-    reach = moved_limit(result)
-    assert (
-        result.relaxation.startswith("Within reach: working_space_rms ≤ ") and " instead of 0.001 m." in result.summary
-    )
+    reach = 1e-3 * moved_limit(result)
+    assert result.relaxation.startswith("Within reach: working_space_rms ≤ ") and " instead of 1 mm." in result.summary
     for factor, met in ((1.0, True), (0.99, False)):
         again = tune.minimise(COMFORT, CAR, WHITE, limits={"working_space_rms": factor * reach})
         assert (not again.violated) is met
