@@ -8,18 +8,33 @@ from jaxdamp.bench.units import SI, Conversion, conversion, ratio
 ROLES = tuple(SI)
 COMMAND_HEADER = "measured command"  # of a record that the library writes
 _WORDS = {
-    "time": "time zeit elapsed clock timestamp datetime uhrzeit epoch t".split(),
-    "stroke": "stroke displacement disp position pos travel weg hub lvdt extension x s".split(),
-    "velocity": "velocity vel geschwindigkeit xdot speed v".split(),
-    "force": "force load kraft frc loadcell f".split(),
-    "temperature": "temperature temp temperatur thermocouple t".split(),
+    "time": "time zeit temps tempo tiempo elapsed clock timestamp datetime uhrzeit epoch t".split(),
+    "stroke": (
+        "stroke displacement disp position pos travel weg hub course déplacement corsa carrera desplazamiento lvdt"
+        " extension x s"
+    ).split(),
+    "velocity": "velocity vel geschwindigkeit vitesse velocità velocidad xdot speed v".split(),
+    "force": "force load kraft dämpferkraft effort forza fuerza frc loadcell f".split(),
+    "temperature": "temperature temp temperatur température temperatura thermocouple t".split(),
     "command": [],  # see `_is_command`
 }
 _COMMANDS = {"current", "strom", "spulenstrom", "voltage", "spannung"}
 _OF_COMMANDS = {"coil", "valve", "damper", "mr", "solenoid", "measured", "actual", "ventil", "spule", "daempfer"}
 REBOUND = {"rebound", "reb", "extension", "droop", "zugstufe", "ausfederung"}
 COMPRESSION = {"compression", "bump", "jounce", "druckstufe", "einfederung"}
-NOT_MEASURED = {"setpoint", "command", "cmd", "demand", "target", "soll", "reference", "ref", "error"}
+NOT_MEASURED = {
+    "setpoint",
+    "command",
+    "cmd",
+    "demand",
+    "target",
+    "soll",
+    "sollwert",
+    "consigne",
+    "reference",
+    "ref",
+    "error",
+}
 
 
 def split_header(header: str) -> tuple[str, str | None]:
