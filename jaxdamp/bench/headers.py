@@ -22,19 +22,7 @@ _COMMANDS = {"current", "strom", "spulenstrom", "voltage", "spannung"}
 _OF_COMMANDS = {"coil", "valve", "damper", "mr", "solenoid", "measured", "actual", "ventil", "spule", "daempfer"}
 REBOUND = {"rebound", "reb", "extension", "droop", "zugstufe", "ausfederung"}
 COMPRESSION = {"compression", "bump", "jounce", "druckstufe", "einfederung"}
-NOT_MEASURED = {
-    "setpoint",
-    "command",
-    "cmd",
-    "demand",
-    "target",
-    "soll",
-    "sollwert",
-    "consigne",
-    "reference",
-    "ref",
-    "error",
-}
+NOT_MEASURED = {*"setpoint command cmd demand target soll sollwert consigne reference ref error".split()}
 
 
 def split_header(header: str) -> tuple[str, str | None]:
