@@ -2,8 +2,8 @@
 
 import functools
 
+from matplotlib import figure
 from matplotlib.backend_bases import RendererBase
-from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, fontManager, get_font
 from matplotlib.text import Text
 
@@ -16,7 +16,7 @@ EAST_ASIAN = (  # fonts of Linux, Windows and macOS, for what the chosen font la
 )  # fmt: skip
 
 
-class FigureWithFallback(Figure):
+class Figure(figure.Figure):
     """A figure whose texts take letters that their font lacks from others that the machine has."""
 
     def draw(self, renderer: RendererBase) -> None:

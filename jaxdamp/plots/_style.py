@@ -87,9 +87,9 @@ SIMULATE = "Take what `jaxdamp.simulate(vehicle, road)` gives, or several by nam
 
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure [inch] with automatic margins."""
-    from jaxdamp.plots._figure import FigureWithFallback
+    from jaxdamp.plots import _figure
 
-    return FigureWithFallback(figsize=(width, height), dpi=100, layout="constrained")
+    return _figure.Figure(figsize=(width, height), dpi=100, layout="constrained")
 
 
 def line_style(index: int) -> Look:
