@@ -1,4 +1,4 @@
-"""The ride metrics of a vehicle in all scenarios, driven side by side, and how they become one number."""
+"""The ride metrics of a vehicle in all scenarios, and how they become one number."""
 
 import dataclasses
 import functools
@@ -15,7 +15,8 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._jacobian import Mode
 from jaxdamp._limits import largest
-from jaxdamp._quickly import compiled_quickly
+from jaxdamp._quickly import Level, compiled_quickly
+from jaxdamp._traced import is_batched
 from jaxdamp._types import Point, Scalar
 from jaxdamp.metrics import Metric, MetricValues
 from jaxdamp.parameters import checked, get, match_paths, modules_inside, replace, with_values
@@ -74,6 +75,7 @@ class CVaR:
         return jnp.sum(jnp.clip(self.share - before, 0.0, weights) * values) / self.share
 
 
+EVALUATIONS = 5  # that few scenarios should take as long as a sweep of few cars
 RISKS: dict[str, Risk] = {"mean": mean, "worst": worst}
 
 
@@ -96,12 +98,13 @@ class ScenarioRide(eqx.Module):
     the metrics of every scenario. The conditions change numbers by `factor * value + offset`.
     """
 
-    ride: Ride  # of the vehicle on the first road, for many cars at a time
+    ride: Ride  # of the vehicle on the first road
     roads: Float[Array, "scenarios time wheels"] | WhiteRoad  # heights under the wheels [m]; or stacked white roads
     factors: dict[str, Float[Array, "scenarios ..."]]  # by path, in each scenario
     offsets: dict[str, Float[Array, "scenarios ..."]]  # by path, in each scenario
     weights: Float[Array, " scenarios"]  # of the scenarios, which add up to one
     names: tuple[str, ...] = eqx.field(static=True)  # of the scenarios
+    in_turn: bool = eqx.field(static=True)  # driven one after the other, not side by side
     delays_axles: bool = eqx.field(static=True)  # by the distance of the axles, which must not move then
     risk: Risk = eqx.field(static=True)  # how a metric becomes one number
 
@@ -134,8 +137,10 @@ class ScenarioRide(eqx.Module):
         return self.ride.derivatives
 
     def side_by_side(self) -> "ScenarioRide":
-        """The same: it drives many cars at a time in any case."""
-        return self
+        """The same, compiled for many cars at a time."""
+        together = eqx.tree_at(lambda scenarios: scenarios.ride, self, self.ride.side_by_side())
+        object.__setattr__(together, "in_turn", False)
+        return together
 
     def reaching(self, columns: Mapping[str, np.ndarray]) -> "ScenarioRide":
         """The same with as many substeps as the steepest of these values need, if they were not asked for."""
@@ -159,7 +164,7 @@ class ScenarioRide(eqx.Module):
         if point:
             self.refuse_moved_axles("point", lambda values: replace(self.vehicle, values), point)
         white = isinstance(self.roads, WhiteRoad)
-        by_name = _on_white_roads(self, vehicle) if white else _in_each(self, vehicle)
+        by_name = _in_each(self.side_by_side() if is_batched((self, vehicle)) else self, vehicle)
         concrete = [number for value in by_name.values() if (number := _checks.concrete(value)) is not None]
         lost = np.flatnonzero(~np.any(np.isfinite(concrete), axis=0)) if white and concrete else np.zeros(0, int)
         if lost.size and np.ndim(concrete[0]) == 1:
@@ -232,13 +237,17 @@ def _stacked(changes: Mapping[str, Sequence[tuple[Array, Array]]]) -> tuple[dict
     return factors, offsets
 
 
+def _level(scenarios: ScenarioRide, vehicle: AbstractVehicle) -> Level:
+    if isinstance(scenarios.roads, WhiteRoad):
+        return 0
+    return 1 if scenarios.in_turn else None
+
+
+@functools.partial(compiled_quickly, level=_level)
 def _in_each(scenarios: ScenarioRide, vehicle: AbstractVehicle) -> dict[str, Float[Array, " scenarios"]]:
     """The metrics of a vehicle by name in every scenario."""
-    one = functools.partial(_in_one, scenarios, vehicle)
-    return jax.vmap(one)(scenarios.roads, scenarios.factors, scenarios.offsets)
-
-
-_on_white_roads = compiled_quickly(_in_each)
+    one, each = functools.partial(_in_one, scenarios, vehicle), (scenarios.roads, scenarios.factors, scenarios.offsets)
+    return jax.lax.map(lambda rows: one(*rows), each) if scenarios.in_turn else jax.vmap(one)(*each)
 
 
 def scenario_ride(
@@ -258,13 +267,15 @@ def scenario_ride(
         lambda r: (r.vehicle, r.road), first, (vehicle, inputs[0] if white else None), is_leaf=lambda leaf: leaf is None
     )
     factors, offsets = _stacked(changes)
+    in_turn = len(scenarios) <= common.sequential_points // EVALUATIONS and jax.default_backend() == "cpu"
     ride = ScenarioRide(
-        ride=common.side_by_side(),
+        ride=common if in_turn else common.side_by_side(),
         roads=jax.tree.map(lambda *leaves: jnp.stack(leaves), *inputs),
         factors=factors,
         offsets=offsets,
         weights=jnp.asarray([scenario.weight for scenario in scenarios]),
         names=tuple(scenario.name for scenario in scenarios),
+        in_turn=in_turn,
         delays_axles=not white and any(ride.road is not None for ride in rides),
         risk=risk,
     )

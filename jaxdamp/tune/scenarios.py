@@ -55,8 +55,8 @@ class Scenario(NamedTuple):
 class Scenarios:
     """Roads and conditions, each with each: takes the place of the road in `minimise`, `sensitivity` and `robust`.
 
-    All scenarios are driven side by side in one batch. A metric is then one number for all of them, by `risk`; a limit
-    applies in each of them.
+    Few scenarios are driven one after the other, many side by side. A metric is then one number for all of them, by
+    `risk`; a limit applies in each of them.
 
     Arguments:
         roads: by name, or a sequence: several classes, seeds and speeds. All of them are driven for the same time; or

@@ -39,9 +39,13 @@ def test_each_scenario_is_the_ride_of_that_vehicle_on_that_road() -> None:
     hot = parameters.replace(vehicles.presets.quarter_car_000(warm), {"sprung_mass": 1500.0})
     pairs = [(car, road) for road in DRIVEN.values() for car in (CAR, hot)]
     alone = [Ride(car, road, metrics=[ACCELERATION, TYRE], duration=0.5)() for car, road in pairs]
-    each, joined = ride.each(), ride()
+    each, joined, together = ride.each(), ride(), ride.side_by_side()
+    assert ride.in_turn and not together.in_turn
+    batch = jax.vmap(lambda mass: ride({"sprung_mass": mass}))(jnp.full(2, CAR.sprung_mass))
     for name in (ACCELERATION, TYRE):
         np.testing.assert_allclose(each[name], [run[name] for run in alone], rtol=1e-12)
+        np.testing.assert_allclose(together.each()[name], each[name], rtol=1e-11)
+        assert float(batch[name][1]) == pytest.approx(float(together({"sprung_mass": CAR.sprung_mass})[name]))
         assert float(joined[name]) == pytest.approx(float(np.sum(ride.weights * each[name])))
 
 
