@@ -185,7 +185,7 @@ class Computation:
     def is_sequence(self) -> bool:
         """Whether the points are computed one after the other: so few that most of the time is that of compiling."""
         few = isinstance(self.given, HasSequence) and self.points.count <= self.given.sequential_points
-        return few and self._chunk is None and choose_devices(self._devices)[0].platform == "cpu"
+        return few and self._chunk is None
 
     @functools.cached_property
     def function(self) -> PointFunction:

@@ -21,7 +21,7 @@ from jaxdamp.roads import WhiteRoad
 from jaxdamp.simulation import Ride, moves_axles
 from jaxdamp.tune.limits import in_scenarios
 from jaxdamp.tune.objective import Objective
-from jaxdamp.tune.scenario_ride import ScenarioRide
+from jaxdamp.tune.scenario_ride import EVALUATIONS, ScenarioRide
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import RUN, Run
 from jaxdamp.tune.shape import ShapeNumbers
@@ -165,6 +165,9 @@ class Computed(NamedTuple):
 class BatchProgram:
     """Numbers of many points, simulated a fixed number side by side, so that one program is enough.
 
+    A few short rides are simulated one after the other, on each core, since their program compiles in a fraction of the
+    time.
+
     Attributes:
         differentiated: names of the numbers with derivatives: objectives and what is limited.
         points: number of points computed with derivatives.
@@ -173,24 +176,24 @@ class BatchProgram:
     def __init__(self, measured: Measurement, free: FreeParameters, lanes: int) -> None:
         self.lanes, self.free, self.points = min(lanes, LANES), free, 0
         self._compiled = False
-        self.measured = measured if lanes == 1 else measured.by(measured.ride.side_by_side())
         self.differentiated = tuple(dict.fromkeys([*measured.objective.names, *measured.limited_names]))
         modes, few = measured.ride.derivatives, free.values.size <= FORWARD * len(self.differentiated)
         mode: Mode = "forward" if few or self.lanes < LANES else "reverse"
         self._mode: Mode = mode if mode in modes else modes[0]
+        if self.lanes <= measured.ride.sequential_points // EVALUATIONS:
+            self.lanes = 1
+        self.measured = measured if self.lanes == 1 else measured.by(measured.ride.side_by_side())
 
     def values(self, designs: Float[np.ndarray, "points free"], ride: Ride | ScenarioRide | None = None) -> np.ndarray:
         """All numbers of designs, by another ride if one is given."""
-        measured = self.measured if ride is None else self.measured.by(ride.side_by_side())
+        measured = self._on(ride)
         parts = [np.asarray(_values(measured, self.free, part), np.float64) for part in self._in_lanes(designs)]
         return np.concatenate([np.atleast_2d(part) for part in parts])[: len(designs)]
 
     def at(self, designs: Float[np.ndarray, "points free"], ride: Ride | ScenarioRide | None = None) -> Computed:
         """All numbers of designs, and derivatives by the physical values; by another ride if one is given."""
         self.points += len(designs)
-        measured = self.measured
-        if ride is not None:
-            measured = measured.by(ride if self.lanes == 1 else ride.side_by_side())
+        measured = self._on(ride)
 
         def computed(part: Array) -> Computed:
             values, slopes = _values_and_slopes(measured, self.free, part, self.differentiated, self._mode)
@@ -201,6 +204,12 @@ class BatchProgram:
 
         values, slopes = zip(*self._by_cores(computed, self._in_lanes(designs)), strict=True)
         return Computed(np.concatenate(values)[: len(designs)], np.concatenate(slopes)[: len(designs)])
+
+    def _on(self, ride: Ride | ScenarioRide | None) -> Measurement:
+        """What is computed, by another ride if one is given."""
+        if ride is None:
+            return self.measured
+        return self.measured.by(ride if self.lanes == 1 else ride.side_by_side())
 
     def _by_cores(self, compute: Callable[[Array], Computed], parts: Sequence[Array]) -> list[Computed]:
         """One part on each core, once the program is compiled: a car's loop takes one of them."""

@@ -75,7 +75,7 @@ class CVaR:
         return jnp.sum(jnp.clip(self.share - before, 0.0, weights) * values) / self.share
 
 
-EVALUATIONS = 5  # that few scenarios should take as long as a sweep of few cars
+EVALUATIONS = 5  # of a tuning, which together should take no longer than a sweep of few cars
 RISKS: dict[str, Risk] = {"mean": mean, "worst": worst}
 
 
@@ -130,6 +130,11 @@ class ScenarioRide(eqx.Module):
     def lanes(self) -> int:
         """How many points a CPU core computes best side by side."""
         return max(self.ride.lanes // len(self.names), 1)
+
+    @property
+    def sequential_points(self) -> int:
+        """Up to how many points a CPU has sooner one after the other."""
+        return self.ride.sequential_points // len(self.names) if self.in_turn else 0
 
     @property
     def derivatives(self) -> tuple[Mode, ...]:
@@ -267,7 +272,7 @@ def scenario_ride(
         lambda r: (r.vehicle, r.road), first, (vehicle, inputs[0] if white else None), is_leaf=lambda leaf: leaf is None
     )
     factors, offsets = _stacked(changes)
-    in_turn = len(scenarios) <= common.sequential_points // EVALUATIONS and jax.default_backend() == "cpu"
+    in_turn = len(scenarios) <= common.sequential_points // EVALUATIONS
     ride = ScenarioRide(
         ride=common if in_turn else common.side_by_side(),
         roads=jax.tree.map(lambda *leaves: jnp.stack(leaves), *inputs),
