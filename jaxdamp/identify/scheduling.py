@@ -121,7 +121,8 @@ class ScheduledFit(AbstractResult):
         said = []
         if varying := self.chain.varying:
             percent, rmse, _ = self.result.score(varying)
-            said = [f"Where the command varies ({len(varying)} records): fit {percent:.1f} %, RMSE {rmse:.1f} N."]
+            of = f"{len(varying)} record{'s' * (len(varying) > 1)}"
+            said = [f"Where the command varies ({of}): fit {percent:.1f} %, RMSE {rmse:.1f} N."]
         return (
             self.summary,
             self.choice.reason,

@@ -8,6 +8,7 @@ import numpy as np
 from jaxdamp import plots
 from jaxdamp._settings import with_defaults
 from jaxdamp._tables import Column, Table
+from jaxdamp._words import class_words, first_upper
 from jaxdamp.bench import RideRecord
 from jaxdamp.identify import VehicleComparison, VehicleFit, without_machine
 from jaxdamp.parameters import get
@@ -132,6 +133,7 @@ def _summary(result: VehicleFit) -> str:
     also = f" and {benches} bench records" if benches else ""
     held = f" {', '.join(result.held)} is held at its start." if result.held else ""
     return (
-        f"{type(result.vehicle).__name__}: {free} free numbers from {count} record{'s' * (count > 1)} of its motion"
+        f"{first_upper(class_words(result.vehicle))}: {free} free numbers from"
+        f" {count} record{'s' * (count > 1)} of its motion"
         f"{also}; {result.worst}.{held}"
     )
