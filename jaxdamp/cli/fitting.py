@@ -273,8 +273,7 @@ def show(screen: Screen, fits: Fitted) -> None:
     screen.points(fits.failures, style="red")
     points = all(run.of_points for run in best.result.runs)
     further = len(set(names_of(points=points)) - {rung.name for rung in comparison.rungs})
-    unsure = best.doubt or any(identify.COMPARE_LAWS in warning for warning in best.result.warnings)
-    if several and unsure and further:
+    if several and further and (best.doubt or best.result.left_out.of_law):
         screen.points([f"--law all tries {further} further laws"])
     warnings = best.result.warnings if screen.verbose else best.result.main_warnings
     screen.remarks([*warnings, *comparison.verdict[lines:]], style="yellow")

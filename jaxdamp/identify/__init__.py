@@ -22,7 +22,6 @@ from jaxdamp.identify.ladder import (
     suited_laws as suited_laws,
 )
 from jaxdamp.identify.law_result import FitResult as FitResult
-from jaxdamp.identify.left_out import COMPARE_LAWS as COMPARE_LAWS
 from jaxdamp.identify.line import ControlCharts as ControlCharts, control_charts
 from jaxdamp.identify.machine import (
     OFFSET as OFFSET,

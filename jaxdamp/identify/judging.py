@@ -103,13 +103,12 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
         *off_span(model, problem.fitted_to, problem.initial_state),
     )
     commands = not_followed(law, problem.fitted_to, pooled=pooled)
-    missed = LeftOut([]) if commands else left_out(problem, best)  # which would be taken for what the commands do
-    effects = missed.sentences
-    on_rest = on_misfit(noise, estimates.estimates, bool(effects))
+    missed = LeftOut(()) if commands else left_out(problem, best)  # which would be taken for what the commands do
+    on_rest = on_misfit(noise, estimates.estimates, bool(missed.sentences))
     on_records += _averaged(problem, best)
     gas = gas_in_words(model, problem.fitted_to, estimates.estimates, estimates.covariance)
-    main = (*notes, *on_records, *effects, *gas, *estimates.summary, *on_rest)
-    notes += [*on_records, *gas, *estimates.notes, *on_rest, *effects]
+    main = (*notes, *on_records, *missed.sentences, *gas, *estimates.summary, *on_rest)
+    notes += [*on_records, *gas, *estimates.notes, *on_rest, *missed.sentences]
     return FitResult(
         law=with_standard_errors(law, _errors_of_law(model, estimates)),
         runs=problem.runs,
@@ -123,7 +122,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
         initial_state=problem.initial_state,
         record_rigs=tuple(rig for rig in map(rig_of, models) if rig is not None),
         record_starts=starts_in(model),
-        delay_left_out=missed.delay,
+        left_out=missed,
         **fields_of_fit(problem, solution, noise, estimates),
     )
 

@@ -16,6 +16,7 @@ from jaxdamp._types import Figure, VectorLike
 from jaxdamp.bench import BenchRun, as_runs, initial_temperature
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.estimates import parameter_table
+from jaxdamp.identify.left_out import LeftOut
 from jaxdamp.identify.model import Model, RecordStart, of_record, on_rig
 from jaxdamp.identify.predicting import ErrorShares, Score, error_shares, predict_by_record, score
 from jaxdamp.identify.propagation import Band, band
@@ -123,12 +124,12 @@ class FitResult(AbstractFitted, Fit):
     Attributes:
         record_laws: the law of each record, if parameters have a value for each record; `law` then has their means.
         record_rigs: the test machine of each record, as `record_laws`.
-        delay_left_out: delay of the force [s] that most of the squared residual is like; None if it is not.
+        left_out: what the residual shows that the fit left out.
     """
 
     record_laws: tuple[AbstractDamper, ...] = dataclasses.field(default=(), kw_only=True)
     record_rigs: tuple[Rig, ...] = dataclasses.field(default=(), kw_only=True)
-    delay_left_out: float | None = dataclasses.field(default=None, kw_only=True)
+    left_out: LeftOut = dataclasses.field(default=LeftOut(()), kw_only=True)
 
     @property
     def static_force(self) -> float:

@@ -58,7 +58,7 @@ FIRST_SIZE = 1e-6  # s, of a delay or a lag
 MOST_EFFECTS = 3
 MAINS_GRID = 0.05  # Hz, to which lines of the mains are rounded
 MOST = 0.5  # of the squared residual
-COMPARE_LAWS = "Compare laws before anything is added to the machine."
+LAST_WORD = "Compare laws before anything is added to the machine."
 
 
 class _Named(NamedTuple):
@@ -78,10 +78,17 @@ class _Named(NamedTuple):
 
 
 class LeftOut(NamedTuple):
-    """What a fit left out: in words, and the delay of the force [s] that most of its residual is like."""
+    """What a fit left out, as its residual shows.
 
-    sentences: list[str]
+    Attributes:
+        sentences: in words.
+        delay: of the force [s], that most of the squared residual is like; None if it is not.
+        of_law: whether it is something of the damper, which the law misses.
+    """
+
+    sentences: Sequence[str]
     delay: float | None = None
+    of_law: bool = False
 
 
 def left_out(problem: Problem, best: SearchEnd) -> LeftOut:
@@ -92,12 +99,12 @@ def left_out(problem: Problem, best: SearchEnd) -> LeftOut:
     """
     used = problem.used
     if problem.is_rounding(best.squares) or np.count_nonzero(used) <= 2 * best.values.size:
-        return LeftOut([])
+        return LeftOut(())
     span = np.linalg.qr(unit_columns(best.jacobian)[0][used])[0]
     residual = span_free(span, -best.residual[used])
     records = list(records_of(problem, best))
     if not records:
-        return LeftOut([])
+        return LeftOut(())
     squares, repeated = float(residual @ residual), _repeated(residual, records)
     of_mains, residual, span = _mains(problem, records, residual, span)
     scatter, least = _scatter(problem, records, squares)
@@ -111,8 +118,8 @@ def left_out(problem: Problem, best: SearchEnd) -> LeftOut:
     if (named and named[-1].effect.name in OF_LAW) or (
         not static and repeated > 0 and left > max(OF_THE_LAW * asked, sure)
     ):
-        of_law = _of_the_law(named, left / repeated if repeated > 0 else 1.0, is_memoryless(problem.law))
-        return LeftOut([*scatter, of_law, *of_mains], _delay(named))
+        missed = _of_the_law(named, left / repeated if repeated > 0 else 1.0, is_memoryless(problem.law))
+        return LeftOut([*scatter, missed, *of_mains], _delay(named), of_law=True)
     looks = ((one.words.format("of the squared residual look"), one.effect.remedy) for one in named)
     words = (f"{look}, which the fit leaves out: {remedy}." for look, remedy in looks)
     return LeftOut([*scatter, *words, *of_mains], _delay(named))
@@ -145,12 +152,12 @@ def _of_the_law(named: Sequence[_Named], left: float, memoryless: bool) -> str:
         effect = named[-1].effect
         misses = f"By the residual, the law misses {effect.words(named[-1].said)}{alike}"
         if memoryless:
-            return f"{misses}: {effect.remedy}. {COMPARE_LAWS}"
+            return f"{misses}: {effect.remedy}. {LAST_WORD}"
         of_memory = effect.remedy if effect.name == "hysteresis" else ""
-        return f"{misses}: {of_memory}." if of_memory else f"{misses}. {COMPARE_LAWS}"
+        return f"{misses}: {of_memory}." if of_memory else f"{misses}. {LAST_WORD}"
     return (
         f"The residual repeats from cycle to cycle, and no effect of the test machine explains"
-        f" {_percent(min(left, 1.0))} % of that{alike}: the law misses something of the damper. {COMPARE_LAWS}"
+        f" {_percent(min(left, 1.0))} % of that{alike}: the law misses something of the damper. {LAST_WORD}"
     )
 
 

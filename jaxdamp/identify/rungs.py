@@ -258,9 +258,10 @@ def verdict(choice: Recommendation[Rung], rungs: Sequence[Rung], held_out: Seque
 
 def _late(best: Rung, static: Rung) -> list[str]:
     """A sentence where the memory of the recommended law may be a delay of the channel, as that without shows."""
-    if static is best or isinstance(static.result, ScheduledFit) or static.result.delay_left_out is None:
+    delay = static.result.left_out.delay
+    if static is best or delay is None:
         return []
-    late = 1e3 * static.result.delay_left_out
+    late = 1e3 * delay
     way = "late" if late > 0 else "early"
     return [
         f"By {static.name}, the force channel may be {abs(late):.2g} ms {way}, which {best.name} imitates:"

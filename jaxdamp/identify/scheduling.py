@@ -121,8 +121,7 @@ class ScheduledFit(AbstractResult):
         said = []
         if varying := self.chain.varying:
             percent, rmse, _ = self.result.score(varying)
-            of = f"{len(varying)} record{'s' * (len(varying) > 1)}"
-            said = [f"Where the command varies ({of}): fit {percent:.1f} %, RMSE {rmse:.1f} N."]
+            said = [f"Where the command varies: fit {percent:.1f} %, RMSE {rmse:.1f} N."]
         return (
             self.summary,
             self.choice.reason,

@@ -47,7 +47,9 @@ from jaxdamp.simulation.wheels import delays_by_itself, heights_under_wheels, mo
 from jaxdamp.vehicles import AbstractVehicle, EquivalentDamper, is_stationary, refuse_controller
 
 
-SEQUENCE = 1_000_000  # instants of all cars together up to which they are driven one after the other
+# Steps of all cars together up to which they are driven one after the other: a first sweep then takes a fifth (full
+# cars) to five sixths (linear quarter cars) of the time, later ones about as long (`python -m benchmarks.few_cars`).
+SEQUENCE = 400_000
 
 
 @final
@@ -174,13 +176,10 @@ class Ride(eqx.Module):
 
     @property
     def sequential_points(self) -> int:
-        """Up to how many cars a CPU has sooner one after the other.
-
-        They take a second, and a program of many cars 2 to 20 s longer to compile than one of a car.
-        """
+        """Up to how many cars a CPU has sooner one after the other, whose program compiles in less time."""
         if self.engine.runs_printed or self.heights is None or jax.default_backend() != "cpu":
             return 0
-        return SEQUENCE // self.heights.shape[0]
+        return SEQUENCE // ((self.heights.shape[0] - 1) * self.substeps)
 
     @property
     def derivatives(self) -> tuple[Mode, ...]:

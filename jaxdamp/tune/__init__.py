@@ -24,8 +24,8 @@ from jaxdamp.tune.pareto_search import pareto
 from jaxdamp.tune.ranges import Choice
 from jaxdamp.tune.rescoring import Rescore as Rescore, rescore
 from jaxdamp.tune.result import TuneResult as TuneResult
+from jaxdamp.tune.risk import CVaR
 from jaxdamp.tune.robust_tuning import robust, tolerance_effects
-from jaxdamp.tune.scenario_ride import CVaR
 from jaxdamp.tune.scenarios import Condition, Scenarios, samples, tolerances
 from jaxdamp.tune.sensitivities import sensitivity
 from jaxdamp.tune.sensitivity_result import Sensitivity as Sensitivity

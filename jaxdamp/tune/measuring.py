@@ -21,7 +21,7 @@ from jaxdamp.roads import WhiteRoad
 from jaxdamp.simulation import Ride, moves_axles
 from jaxdamp.tune.limits import in_scenarios
 from jaxdamp.tune.objective import Objective
-from jaxdamp.tune.scenario_ride import EVALUATIONS, ScenarioRide
+from jaxdamp.tune.scenario_ride import TUNED, ScenarioRide
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import RUN, Run
 from jaxdamp.tune.shape import ShapeNumbers
@@ -180,7 +180,7 @@ class BatchProgram:
         modes, few = measured.ride.derivatives, free.values.size <= FORWARD * len(self.differentiated)
         mode: Mode = "forward" if few or self.lanes < LANES else "reverse"
         self._mode: Mode = mode if mode in modes else modes[0]
-        if self.lanes <= measured.ride.sequential_points // EVALUATIONS:
+        if self.lanes <= measured.ride.sequential_points // TUNED:
             self.lanes = 1
         self.measured = measured if self.lanes == 1 else measured.by(measured.ride.side_by_side())
 

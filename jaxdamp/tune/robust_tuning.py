@@ -15,7 +15,7 @@ from jaxdamp.parameters import free_parameters, match_paths
 from jaxdamp.tune.minimising import minimise
 from jaxdamp.tune.objective import Function
 from jaxdamp.tune.result import ToleranceEffect, TuneResult, V
-from jaxdamp.tune.scenario_ride import Risk
+from jaxdamp.tune.risk import Risk
 from jaxdamp.tune.scenarios import Road, Scenarios, check_scatter
 from jaxdamp.tune.sensitivities import SensitivitySettings, sensitivity
 from jaxdamp.tune.settings import DEFAULTS, RUN, Run, Settings

@@ -1,9 +1,8 @@
-"""The ride metrics of a vehicle in all scenarios, and how they become one number."""
+"""The ride metrics of a vehicle in all scenarios."""
 
-import dataclasses
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, TypeAlias, TypeVar, final
+from typing import TYPE_CHECKING, TypeVar, final
 
 import equinox as eqx
 import jax
@@ -14,7 +13,6 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._jacobian import Mode
-from jaxdamp._limits import largest
 from jaxdamp._quickly import Level, compiled_quickly
 from jaxdamp._traced import is_batched
 from jaxdamp._types import Point, Scalar
@@ -22,6 +20,7 @@ from jaxdamp.metrics import Metric, MetricValues
 from jaxdamp.parameters import checked, get, match_paths, modules_inside, replace, with_values
 from jaxdamp.roads import WhiteRoad
 from jaxdamp.simulation import Designs, Ride, moves_axles, refuse_without_stationary_motion
+from jaxdamp.tune.risk import Risk
 from jaxdamp.tune.settings import Run
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -30,64 +29,9 @@ if TYPE_CHECKING:
     from jaxdamp.tune.scenarios import Condition, Scenario
 
 
-Values: TypeAlias = Float[Array, " scenarios"]
-Risk: TypeAlias = Callable[[Values, Values], Scalar]  # of the values and their weights, which add up to one
 T = TypeVar("T")
 K = TypeVar("K")
-
-
-def mean(values: Values, weights: Values) -> Scalar:
-    """The weighted mean."""
-    return jnp.sum(weights * values)
-
-
-def worst(values: Values, weights: Values) -> Scalar:
-    """The largest value, whatever the weights, with the derivatives of its scenario."""
-    del weights
-    return largest(values)
-
-
-@final
-@dataclasses.dataclass(frozen=True)
-class CVaR:
-    """Conditional value at risk: the mean of the worst share of the scenarios, by weight.
-
-    Arguments:
-        share: of all scenarios, above 0 and up to 1, which is the mean.
-
-    >>> float(CVaR(0.5)(jnp.array([1.0, 4.0, 2.0, 3.0]), jnp.full(4, 0.25)))
-    3.5
-    """
-
-    share: float
-
-    def __post_init__(self) -> None:
-        remedy = "0.1 is the worst tenth of the scenarios."
-        _checks.positive("share", self.share, remedy)
-        if not self.share <= 1.0:
-            _checks.refuse("share", "be above 0 and up to 1", self.share, remedy)
-
-    def __call__(self, values: Values, weights: Values) -> Scalar:
-        """The mean of the worst share."""
-        order = jnp.argsort(-jax.lax.stop_gradient(values))
-        values, weights = values[order], weights[order]
-        before = jnp.cumsum(weights) - weights
-        return jnp.sum(jnp.clip(self.share - before, 0.0, weights) * values) / self.share
-
-
-EVALUATIONS = 5  # of a tuning, which together should take no longer than a sweep of few cars
-RISKS: dict[str, Risk] = {"mean": mean, "worst": worst}
-
-
-def risk_of(risk: str | Risk) -> Risk:
-    """The risk of a name, or the function itself."""
-    if not isinstance(risk, str):
-        if not callable(risk):
-            must = "be 'mean', 'worst', `tune.CVaR(share)`, or a function of values and weights"
-            _checks.refuse("risk", must, _checks.described(risk), "Write `risk='worst'`.")
-        return risk
-    _checks.one_of("risk", risk, RISKS)
-    return RISKS[risk]
+TUNED = 2  # times as long as a sweep of few cars: a tuning drives its cars dozens of times
 
 
 @final
@@ -272,7 +216,7 @@ def scenario_ride(
         lambda r: (r.vehicle, r.road), first, (vehicle, inputs[0] if white else None), is_leaf=lambda leaf: leaf is None
     )
     factors, offsets = _stacked(changes)
-    in_turn = len(scenarios) <= common.sequential_points // EVALUATIONS
+    in_turn = len(scenarios) <= common.sequential_points // TUNED
     ride = ScenarioRide(
         ride=common if in_turn else common.side_by_side(),
         roads=jax.tree.map(lambda *leaves: jnp.stack(leaves), *inputs),

@@ -16,7 +16,8 @@ from jaxdamp._types import Point, Value
 from jaxdamp.metrics import Metric
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import AbstractEngine
-from jaxdamp.tune.scenario_ride import RISKS, Risk, ScenarioRide, risk_of, scenario_ride
+from jaxdamp.tune.risk import RISKS, Risk, risk_of
+from jaxdamp.tune.scenario_ride import ScenarioRide, scenario_ride
 from jaxdamp.tune.settings import Run
 from jaxdamp.vehicles import AbstractVehicle
 

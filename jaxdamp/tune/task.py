@@ -34,7 +34,8 @@ from jaxdamp.tune.measuring import BatchProgram, Computed, Measurement
 from jaxdamp.tune.objective import Function, Targets, goal_limits, goal_objective, objective_of
 from jaxdamp.tune.ranges import SearchRange, search_range, start_points
 from jaxdamp.tune.result import V
-from jaxdamp.tune.scenario_ride import designs_under, in_condition, worst
+from jaxdamp.tune.risk import worst
+from jaxdamp.tune.scenario_ride import designs_under, in_condition
 from jaxdamp.tune.scenarios import Condition, Road, Scenario, Scenarios
 from jaxdamp.tune.settings import LEAST, RUN, Run, Settings
 from jaxdamp.tune.shape import ShapeNumbers

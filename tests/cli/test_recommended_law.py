@@ -54,8 +54,7 @@ def test_verdict_object_file_and_page_never_disagree(situation: str, tmp_path: P
     screen.console = Console(file=text, width=400)
     show(screen, Fitted(comparison, []))
     assert text.getvalue().strip().startswith(f"Recommended: {best.name}, ")
-    misses = any("Compare laws before anything" in warning for warning in best.result.warnings)
-    assert ("--law all tries" in text.getvalue()) == (bool(best.doubt) or misses)
+    assert ("--law all tries" in text.getvalue()) == (bool(best.doubt) or best.result.left_out.of_law)
     attempts = Attempts()
     write_fits(tmp_path, comparison, BenchSet(bench.as_runs(runs)), attempts)
     assert not attempts.troubles
