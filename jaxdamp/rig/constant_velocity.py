@@ -13,7 +13,7 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._quickly import compiled_for_loops
 from jaxdamp._traced import of_known_numbers
-from jaxdamp.dampers import AbstractDamper, Heated, coverage, laws_inside
+from jaxdamp.dampers import AbstractDamper, Heated, MonoTube, TwinTube, coverage, laws_inside
 from jaxdamp.parameters import as_float, with_values
 from jaxdamp.rig.law_numbers import is_number, numbers_of
 from jaxdamp.rig.printed import numbers_on_rig, printed_law
@@ -25,7 +25,7 @@ class QuasiStatic(NamedTuple):
 
     Attributes:
         velocity: the velocities asked for [m/s], shape (points,).
-        force: settled force [N], NaN where the law does not settle or has no finite force, shape (points,).
+        force: settled force [N], NaN where the law does not settle, has a cavity or no finite force, shape (points,).
         settled: which points have a force, shape (points,).
         note: how many points have none, where and why, in words; empty if all have one.
         states: states of the law at the end, NaN where it does not settle, shape (points, states): a start for
@@ -43,6 +43,7 @@ MOST_REMEMBERED = 64  # curves
 LONGEST_HOLD = 64  # s at constant velocity
 LONG = 1e30  # s, in which a law does not cool
 STEADY = 1e-4  # change of a force while the time held doubles, relative to the scale of the forces: settled
+NO_CAVITY = -1e30  # Pa, below the pressure of any oil
 STILL = {"float64": 1e-9, "float32": 1e-3}  # the same, at which no longer hold can improve the curve
 
 
@@ -55,8 +56,9 @@ def quasi_static(
     Each velocity is held at one stroke for 1, 2, 4 ... up to 64 s, until no force changes any more; a memoryless law
     answers at once. A point is settled if its force changed, over the last doubling of the time, by no more than 1e-4
     of itself or of the largest settled force. A `Heated` law keeps its `initial_rise`. Friction that acts through a
-    bristle needs longer the slower it moves, and a law that drifts never settles: such points are left without a force,
-    and the note says so.
+    bristle needs longer the slower it moves, a law that drifts never settles, and with a cavity in the oil, which
+    grows as the damper moves on, the force depends on the stroke: such points are left without a force, and the note
+    says so.
 
     Arguments:
         law: the damper law.
@@ -115,12 +117,11 @@ class _Keyed:
 def _settled(question: _Keyed) -> QuasiStatic:
     """The curve, which a table, a picture and a page ask for one after the other."""
     law, velocities, stroke = question.content
-    begin = np.asarray(law.initial_state())
-    states = on_device(np.broadcast_to(begin, (velocities.size, begin.size)).copy())
+    states = _at_rest(law, velocities.size)
     states, force = _hold(law, stroke, velocities, states, jnp.asarray(0))
-    if begin.size == 0:
+    if states.size == 0:
         settled = np.isfinite(force)
-        note = _gaps(law, np.asarray(velocities), np.asarray(force), settled)
+        note = _gaps(law, np.asarray(velocities), np.asarray(force), settled, np.zeros_like(settled))
         return QuasiStatic(velocities, force, settled, note, states)
     seconds, change = 0, np.full(velocities.shape, np.inf)
     while seconds < LONGEST_HOLD:
@@ -133,17 +134,46 @@ def _settled(question: _Keyed) -> QuasiStatic:
     limit = STEADY if force.dtype == jnp.float64 else STILL["float32"]
     alone = change <= limit * size
     settled = np.isfinite(size) & (alone | (change <= limit * np.max(size, where=alone, initial=0.0)))
-    note = _gaps(law, np.asarray(velocities), np.asarray(force), settled)
+    cavities = settled & _differs_by_cavities(law, stroke, velocities, seconds, np.asarray(force), limit)
+    settled &= ~cavities
+    note = _gaps(law, np.asarray(velocities), np.asarray(force), settled, cavities)
     states = on_device(np.where(settled[:, None], states, np.nan))
     return QuasiStatic(velocities, on_device(np.where(settled, force, np.nan)), settled, note, states)
 
 
-def _gaps(law: AbstractDamper, velocity: np.ndarray, force: np.ndarray, settled: np.ndarray) -> str:
+def _at_rest(law: AbstractDamper, count: int) -> Array:
+    """The states of so many dampers at rest."""
+    begin = np.asarray(law.initial_state())
+    return on_device(np.broadcast_to(begin, (count, begin.size)).copy())
+
+
+def _differs_by_cavities(
+    law: AbstractDamper, stroke: float, velocities: Array, seconds: int, force: np.ndarray, limit: float
+) -> np.ndarray:
+    """Where a force held so long is not that of the law without cavities.
+
+    A cavity that is held at one stroke grows until it has compressed the gas: no stroke is as long.
+    """
+    tubes = [(path, part) for path, part in laws_inside(law) if isinstance(part, MonoTube | TwinTube)]
+    if not tubes:
+        return np.zeros(force.shape, bool)
+    never = {
+        f"{prefix}cavitation_pressure": jnp.full_like(part.cavitation_pressure, NO_CAVITY) for prefix, part in tubes
+    }
+    held = jnp.asarray(1000 * seconds)
+    oil = np.asarray(_hold(with_values(law, never), stroke, velocities, _at_rest(law, velocities.size), held)[1])
+    return np.abs(force - oil) > limit * np.abs(oil)
+
+
+def _gaps(
+    law: AbstractDamper, velocity: np.ndarray, force: np.ndarray, settled: np.ndarray, cavities: np.ndarray
+) -> str:
     """Where a law has no settled force, and why."""
     finite = np.isfinite(force)
     reasons = (
         (~finite, f"the law gives no finite force. {coverage(law)}".strip()),
-        (finite & ~settled, f"the force still changes after {LONGEST_HOLD} s of constant velocity."),
+        (cavities, "a cavity opens in the oil and grows, so that the force depends on the stroke (`jaxdamp.respond`)."),
+        (finite & ~settled & ~cavities, f"the force still changes after {LONGEST_HOLD} s of constant velocity."),
     )
     notes = []
     for at, why in reasons:

@@ -24,6 +24,7 @@ from jaxdamp.dampers import AbstractDamper, MonoTube, TwinTube
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.rig import march, quasi_static, respond
 from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, least_squares_on_host
+from jaxdamp.tune.cavities import with_cavities
 from jaxdamp.tune.ranges import INSIDE, Bound, SearchRange, search_range
 from jaxdamp.tune.settings import Free
 from jaxdamp.tune.valving_result import OutOfReach, ValveParameter, ValvingResult
@@ -107,8 +108,8 @@ def valving(
     If the remaining error is above the tolerance, the result says in which range of velocity, by how much, and which
     bound prevents more.
 
-    Curves are compared without cavities, which have no slope that leads out of them; the error that is stated holds
-    them, and a sentence says where one opens.
+    Curves are compared without cavities, which have no slope that leads out of them; the error that is stated is that
+    with cavities that have just opened, the largest one, and a sentence says where one opens.
 
     The force has kinks where valves open, and rises within a sample or two where a cavity closes, so the sum of squares
     has narrow local minima. Where a search ends, each parameter is therefore changed by 1 and 10 %, up and down, and
@@ -134,7 +135,8 @@ def valving(
             the damper; what `minimise` refuses of `over`, `freeze` and `bounds`.
 
     >>> wanted = MonoTube.reference().incompressible()
-    >>> result = valving(wanted, MonoTube.reference(), over=["bleed_area", "*_opening_pressure"])
+    >>> chosen = ["bleed_area", "*_opening_pressure"]
+    >>> result = valving(wanted, MonoTube.reference(), velocities=[-0.8, -0.3, -0.1, 0.1, 0.3, 0.8], over=chosen)
     >>> result.feasible, result.rmse < 1.0
     (True, True)
     """
@@ -158,8 +160,9 @@ def valving(
         _checks.refuse("start", "give a finite force", start, "Widen its valves, or shorten the motion.")
     compared, slopes = force_of(best.values)
     law = space.free.build(jnp.asarray(best.values, space.free.values.dtype))
-    reached, cavities = _with_cavities(law, wanted, compared, CAVITY * tolerance * size)
+    reached, cavities = with_cavities(law, wanted.velocity, compared, CAVITY * tolerance * size)
     error = reached - wanted.all_forces
+    full = np.where(cavities, 0.0, error)  # where no valve has an effect, nothing is to be said of its bound
     parameters = tuple(
         ValveParameter(c.name, c.unit, c.before, c.after, c.lower, c.upper, c.note, p.meaning)
         for c, p in zip(space.changes(best.values), space.free.owners, strict=True)
@@ -178,22 +181,10 @@ def valving(
         rmse=rmse,
         error_percent=100.0 * rmse / size,
         tolerance=tolerance,
-        out_of_reach=_out_of_reach(wanted, error, slopes, parameters, tolerance * size) if far else (),
+        out_of_reach=_out_of_reach(wanted, full, slopes, parameters, tolerance * size) if far else (),
         status=best.status,
         cavities=cavities,
     )
-
-
-def _with_cavities(
-    law: MonoTube | TwinTube, wanted: Wanted, compared: np.ndarray, allowed: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """The forces, with those of settled states where these differ by more, and where: a search sees no cavities."""
-    count = wanted.velocity.size
-    table = compared.copy()
-    if count:
-        table[:count] = np.asarray(quasi_static(law, wanted.velocity).force)
-    cavities = np.abs(table - compared) > allowed  # not where no state settles
-    return np.where(cavities, table, compared), cavities
 
 
 def _best(

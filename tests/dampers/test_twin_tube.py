@@ -126,6 +126,17 @@ def test_the_base_valve_passes_what_the_rod_displaces():
     np.testing.assert_allclose(forces[0], quasi_static(thin.incompressible(), v).force, rtol=3e-3)
 
 
+def test_a_curve_ends_where_a_cavity_opens():
+    """Held for seconds, a cavity compressed the gas until it passed as much oil as without it: 60 % too much force."""
+    weak = {"base.compression_opening_pressure": 2e5, "base.compression_valve_stiffness": 5e10}
+    law, v = replace(LAW, weak), np.array([-1.0, -0.1, 0.3])
+    moving = respond(law, *_sine(1.0 / (0.08 * np.pi), 0.04, 2000))  # of 1 m/s
+    assert np.min(np.asarray(moving)[1000:]) > -10e3
+    curve = quasi_static(law, v)
+    assert curve.settled.tolist() == [False, True, True] and "cavity" in curve.note
+    np.testing.assert_allclose(curve.force[1:], quasi_static(law.incompressible(), v[1:]).force, rtol=3e-3)
+
+
 def test_slow_strokes_show_the_gas():
     """k = n p A_r²/V_g, around −(p − p_atm) A_r, with no hysteresis but friction."""
     silent = replace(LAW, {"friction_force": 1e-6})

@@ -28,8 +28,9 @@ def out_of_reach():
 
 
 def test_the_valving_of_a_known_damper_is_recovered_from_its_curve():
-    force = np.asarray(rig.quasi_static(TRUTH.incompressible(), CURVE).force)
-    result = tune.valving((CURVE, force), START, over=list(CHOSEN), starts=1)
+    slower = 0.9 * CURVE  # at which no cavity opens
+    force = np.asarray(rig.quasi_static(TRUTH.incompressible(), slower).force)
+    result = tune.valving((slower, force), START, over=list(CHOSEN), starts=1)
     assert result.feasible and result.status is tune.Status.CONVERGED and not result.out_of_reach
     for p in result.parameters:
         assert p.value == pytest.approx(float(parameters.get(TRUTH, p.name)), rel=1e-5)
@@ -74,7 +75,8 @@ def test_a_target_beyond_the_bounds_names_them(out_of_reach):
 
 def test_a_binding_bound_that_is_widened_helps(out_of_reach):
     soft = next(part for part in out_of_reach.out_of_reach if part.side == "compression")
-    wider = {name: (0.05 * CHOSEN[name], 20.0 * CHOSEN[name]) for name in soft.binding}
+    # not that of the gas pressure: with less, cavities open at all velocities
+    wider = {name: (0.05 * CHOSEN[name], 20.0 * CHOSEN[name]) for name in soft.binding if name != "gas.pressure"}
     again = tune.valving(
         dampers.Bilinear(6000.0, 900.0), START, velocities=CURVE, over=list(CHOSEN), bounds=wider, starts=1
     )
@@ -83,11 +85,18 @@ def test_a_binding_bound_that_is_widened_helps(out_of_reach):
 
 def test_a_cavity_is_in_the_error_and_its_remedy_works():
     v = np.linspace(-1.0, 1.0, 10)
-    sheet = v, np.asarray(rig.quasi_static(TRUTH, v).force) - float(TRUTH.force(0.0, 0.0, jnp.zeros(1)))
+    sheet = (
+        v,
+        np.asarray(rig.quasi_static(TRUTH.incompressible(), v).force) - float(TRUTH.force(0.0, 0.0, jnp.zeros(1))),
+    )
     result = tune.valving(sheet, TRUTH, starts=2)  # which lowers the gas pressure, as a sheet is without gas force
-    own = np.asarray(rig.quasi_static(result.law, v).force)
+    law, gas = result.law, result.law.gas
+    # with a cavity its pressure is above the piston, and below it that of the gas, which it has not compressed yet
+    opened = float(gas.force(0.0, 0.0, jnp.zeros(0)) - law.piston.area * (gas.pressure - law.cavitation_pressure))
+    full = np.asarray(rig.quasi_static(law.incompressible(), v).force)
+    own = np.maximum(full, opened + np.asarray(rig.quasi_static(law.friction, v).force))
     np.testing.assert_allclose(result.force, own, atol=float(0.1 * result.tolerance * np.std(sheet[1])))
-    assert result.rmse == pytest.approx(np.sqrt(np.mean((own - sheet[1]) ** 2)), rel=0.02)
+    assert result.rmse == pytest.approx(np.sqrt(np.mean((own - sheet[1]) ** 2)), rel=1e-3)
     (said,) = [text for text in result.warnings if "cavity" in text]
     first, largest = np.abs(v[result.cavities]).min(), np.abs(own - sheet[1]).max()
     assert said.startswith(
