@@ -191,7 +191,8 @@ def _search(
         late = {
             explained.effect.name: float(explained.sizes[0]) for explained in named if explained.effect.name in LATE
         }
-        explained = _clearest([*effects, hysteresis(problem, records, late)], span, residual, records, squares, numbers)
+        memory = hysteresis(problem, records, span[:, :numbers], late)
+        explained = _clearest([*effects, memory], span, residual, records, squares, numbers)
         if explained is None or explained.share < least:
             break
         if not named and _is_static(explained):

@@ -17,6 +17,7 @@ from jaxdamp.rig import delayed_samples, lagged_samples
 FRICTION_VELOCITY = 0.005  # m/s, width of the sign change of friction
 GAPS = (0.01, 0.015, 0.02, 0.03, 0.045, 0.07, 0.1)  # clearances that are tried, relative to the half stroke
 KNEES = 12  # of a curve of the velocity
+IMITATED = 0.9  # of what a delay changes, which fitted numbers change too where a law imitates one
 FEWEST = 8  # samples of a record
 SHORT = 50.0  # sampling steps for each time constant below which a filter and a delay are one
 OF_LAW = ("curve", "hysteresis")  # effects that no machine has
@@ -176,13 +177,18 @@ def _curve(problem: Problem, records: Sequence[Record]) -> Pattern:
     return Pattern("curve", np.concatenate(parts, axis=1), True, lambda sizes: words, remedy, at_rest)
 
 
-def hysteresis(problem: Problem, records: Sequence[Record], late: dict[str, float]) -> Pattern:
+def hysteresis(problem: Problem, records: Sequence[Record], span: np.ndarray, late: dict[str, float]) -> Pattern:
     """A force that is late by another time in each record and direction, which is memory of a damper.
 
-    A law with a lag imitates a delay of a channel, and leaves such times too. `late` are delay and lag of the force [s]
-    that were found before.
+    A law with a lag imitates a delay of a channel, and leaves such times too; friction with a memory does not. `span`
+    is an orthonormal basis of what the fitted numbers change, `late` are delay and lag of the force [s] that were found
+    before.
     """
-    imitates = not (is_memoryless(problem.law) or any(name.endswith("force_delay") for name in problem.free.names))
+    memoryless = is_memoryless(problem.law)
+    delay = column(records, lambda m: np.gradient(m.force, m.time))
+    imitates = not (memoryless or any(name.endswith("force_delay") for name in problem.free.names)) and bool(
+        np.linalg.norm(span.T @ delay) ** 2 > IMITATED * np.linalg.norm(delay) ** 2
+    )
     values = np.zeros((sum(record.at.size for record in records), 2 * len(records)))
     for k, (_, at, weight, motion, _) in enumerate(records):
         force = motion.force + sum(LATE[name](motion, size) for name, size in late.items())
@@ -193,10 +199,12 @@ def hysteresis(problem: Problem, records: Sequence[Record], late: dict[str, floa
         ends = f"{_late_or_early(1e3 * (sizes + sum(late.values())))} over records and directions"
         if imitates:
             return f"memory of the damper, or a delay of a channel: the force is {ends}, beside the memory of the law"
+        if not memoryless:
+            return f"memory of the damper beside that of the law: its force is {ends}, by no delay of a channel"
         return f"memory of the damper, whose force is {ends} and so by no delay of a channel"
 
     remedy = "take a law with memory, such as besinger_series_spring, besinger_lag or series_spring_dahl"
-    if not is_memoryless(problem.law):
+    if not memoryless:
         remedy = 'compare with a law without memory beside a "delay" of the machine (`rig`)' * imitates
     return Pattern("hysteresis", values, True, words, remedy)
 

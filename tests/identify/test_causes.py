@@ -44,6 +44,16 @@ def test_a_delay_that_the_lag_of_a_law_imitates_is_not_denied():
     assert identify.fit(dampers.Bilinear(2000.0, 2000.0), runs, rig="delay").rmse < lagging.rmse
 
 
+def test_friction_with_a_memory_imitates_no_delay():
+    """The fit once advised, without memory beside a delay, leaves 100 N; this one leaves 34 N."""
+    tests = [bench.SineTest(0.02, f) for f in (0.5, 2.0, 5.0)]
+    truth = dampers.BoucWen(1500.0, 5000.0, 80.0, 6e-4, 0.75, 2.0)
+    runs = bench.VirtualDyno(truth, 500.0, force_noise=5.0).run(tests)
+    rubbing = identify.fit(dampers.Linear(1500.0) + dampers.Dahl(1e5, 50.0), runs, rig="offset")
+    (said,) = (w for w in rubbing.warnings if "law misses memory of the damper" in w)
+    assert "by no delay of a channel" in said and '"delay"' not in said
+
+
 @pytest.mark.parametrize("number", [0, 2])
 def test_the_gain_of_a_record_is_relative_to_the_force_without_it(number):
     """One of four files in lbf that are said to be N: gains of -0.03 and 0.19 were named."""
