@@ -41,7 +41,8 @@ class QuasiStatic(NamedTuple):
 
 MOST_REMEMBERED = 64  # curves
 LONGEST_HOLD = 64  # s at constant velocity
-LONG = 1e30  # s, in which a law does not cool
+# s and J/K, in which a law neither cools nor warms; finite, so that the levels of a command without a share add nothing
+LONG, HEAVY = 1e15, 1e30
 STEADY = 1e-4  # change of a force while the time held doubles, relative to the scale of the forces: settled
 NO_CAVITY = -1e30  # Pa, below the pressure of any oil
 STILL = {"float64": 1e-9, "float32": 1e-3}  # the same, at which no longer hold can improve the curve
@@ -96,7 +97,7 @@ def as_warm_as_it_begins(law: AbstractDamper) -> AbstractDamper:
         law: the damper law.
     """
     heated = [prefix for prefix, part in laws_inside(law) if isinstance(part, Heated)]
-    still = {"heat_capacity": np.asarray(np.inf), "cooling_time": np.asarray(LONG)}
+    still = {"heat_capacity": np.asarray(HEAVY), "cooling_time": np.asarray(LONG)}
     return with_values(law, {f"{prefix}{name}": value for prefix in heated for name, value in still.items()})
 
 

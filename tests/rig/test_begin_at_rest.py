@@ -16,6 +16,7 @@ from jaxdamp.dampers import (
     Linear,
     MonoTube,
     Play,
+    Scheduled,
     SeriesSpring,
     TemperatureScaled,
     TwinTube,
@@ -73,7 +74,12 @@ def test_the_start_that_the_warning_names_is_that_of_a_lead_in():
 def test_heat_neither_moves_in_a_held_curve_nor_makes_a_record_begin_wrong():
     time = np.arange(500) * 1e-3
     stroke, velocity = 0.05 * np.sin(6.0 * time), 0.3 * np.cos(6.0 * time)
-    for law in (Heated(Bilinear(2000.0, 900.0), initial_rise=20.0), 1.0 * Heated(Linear(2000.0), initial_rise=20.0)):
+    warm = Heated(Linear(2000.0), initial_rise=20.0)
+    for law in (
+        Heated(Bilinear(2000.0, 900.0), initial_rise=20.0),
+        1.0 * warm,
+        Scheduled((warm, Heated(Linear(900.0))), levels=[0.0, 2.0], command=0.0),  # the other has no share
+    ):
         assert respond(law, time, stroke, velocity)[0] == pytest.approx(600.0 * np.exp(-0.04))  # and warns of nothing
         held = quasi_static(law, np.array([-0.3, 0.3]))
         assert held.settled.all() and held.force[1] == pytest.approx(600.0 * np.exp(-0.04))
