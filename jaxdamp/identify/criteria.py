@@ -4,7 +4,7 @@ A robust loss is minimised by repeated least squares, in which samples far from 
 one more residual, (value − mean)/standard deviation, in units of the noise, which is estimated between the rounds.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple, final
 
 import equinox as eqx
@@ -17,7 +17,7 @@ from jaxdamp.identify.noise import Noise
 from jaxdamp.identify.problem import Problem, Robust
 from jaxdamp.identify.residuals import AbstractResiduals
 from jaxdamp.identify.search import SearchEnd
-from jaxdamp.identify.several import Solution
+from jaxdamp.identify.several import PROMISING, Solution, distinct_ends
 from jaxdamp.parameters import FreeParameters, get, match_paths, matching, parameters
 
 
@@ -37,15 +37,26 @@ class Loss(NamedTuple):
 
     weight: Callable[[np.ndarray], np.ndarray]  # ψ(u)/u
     slope: Callable[[np.ndarray], np.ndarray]  # ψ'(u)
+    value: Callable[[np.ndarray], np.ndarray]  # twice the integral of ψ
 
 
 LOSSES = {
-    "squares": Loss(np.ones_like, np.ones_like),
+    "squares": Loss(np.ones_like, np.ones_like, np.square),
     "huber": Loss(
-        lambda u: np.minimum(1.0, 1.345 / np.maximum(np.abs(u), 1e-9)), lambda u: (np.abs(u) < 1.345).astype(float)
+        lambda u: np.minimum(1.0, 1.345 / np.maximum(np.abs(u), 1e-9)),
+        lambda u: (np.abs(u) < 1.345).astype(float),
+        lambda u: np.where(np.abs(u) < 1.345, u**2, 1.345 * (2.0 * np.abs(u) - 1.345)),
     ),
-    "soft_l1": Loss(lambda u: (1.0 + (u / 1.5) ** 2) ** -0.5, lambda u: (1.0 + (u / 1.5) ** 2) ** -1.5),
-    "student_t": Loss(lambda u: 5.0 / (4.0 + u**2), lambda u: 5.0 * (4.0 - u**2) / (4.0 + u**2) ** 2),
+    "soft_l1": Loss(
+        lambda u: (1.0 + (u / 1.5) ** 2) ** -0.5,
+        lambda u: (1.0 + (u / 1.5) ** 2) ** -1.5,
+        lambda u: 2.0 * 1.5**2 * ((1.0 + (u / 1.5) ** 2) ** 0.5 - 1.0),
+    ),
+    "student_t": Loss(
+        lambda u: 5.0 / (4.0 + u**2),
+        lambda u: 5.0 * (4.0 - u**2) / (4.0 + u**2) ** 2,
+        lambda u: 5.0 * np.log1p(u**2 / 4.0),
+    ),
 }
 """Huber's loss and the soft absolute value have 95 % of the efficiency of least squares with normal noise, Student's t
 with four degrees of freedom a little less, and it ignores far samples altogether."""
@@ -160,7 +171,7 @@ class Round(NamedTuple):
             spread: robust standard deviation of the residual without these weights, if it is known.
         """
         missed, used = residual / self.root, plain.used
-        unit = 1.0 if loss == "squares" else spread or 1.4826 * float(np.median(np.abs(missed[used])))
+        unit = _unit(missed[used], loss, spread)
         if not unit > 0:
             return None
         relative = missed / unit
@@ -174,6 +185,11 @@ class Round(NamedTuple):
             )
         )
         return Round(problem, np.sqrt(weight))
+
+
+def _unit(missed: Float[np.ndarray, " samples"], loss: str, spread: float | None) -> float:
+    """The robust standard deviation of a residual, unless it is known."""
+    return 1.0 if loss == "squares" else spread or 1.4826 * float(np.median(np.abs(missed)))
 
 
 def solve_by(
@@ -197,7 +213,7 @@ def solve_by(
     if priors:
         solution = solution._replace(noise=float(priors[0].noise))  # which stays where nothing is left to explain
     rounds = 1 if loss == "squares" and not any(part.relative for part in priors) else ROUNDS
-    result = _in_rounds(problem, solution, solve, loss=loss, noise=noise, spread=spread, rounds=rounds)
+    result = _in_rounds(_Rounds(problem, solve, loss, noise, spread, rounds), solution)
     if loss != "squares" or rounds == 1:
         return result
     return _without_its_own_noise(result, solve, noise, starts)
@@ -219,35 +235,75 @@ def _without_its_own_noise(
     if not level < QUIETER * noise_of_records or problem.is_rounding(alone.squares):
         return fitted
     weighed = problem.at_noise(level)
-    return weighed, solve(weighed.started_at(alone.values), 1)._replace(noise=level)
+    return weighed, solve(weighed.started_at(alone.values), starts)._replace(noise=level)
 
 
-def _in_rounds(
-    problem: Problem,
-    solution: Solution,
-    solve: Callable[[Problem, int | None], Solution],
-    *,
-    loss: str,
-    noise: Callable[[Problem, SearchEnd], Noise],
-    spread: float | None,
-    rounds: int,
-) -> tuple[Problem, Solution]:
-    """So many rounds of least squares at most, each with the weights and the noise of the one before."""
-    now = Round(problem)
-    for _ in range(rounds):
-        best = solution.best
-        if not best.finite or problem.is_rounding(best.squares):
-            break
-        level = noise(now.problem, best).level
-        after = now.after(problem, best.residual, level, loss, spread)
-        if after is None:
-            break
-        now, solution = after, solve(after.problem.started_at(best.values), 1)._replace(noise=level)
-        length = np.linalg.norm(solution.best.jacobian, axis=0)
-        moved = np.abs(solution.best.values - best.values) * length
-        if np.all(moved < SETTLED * level):
-            break
-    return now.problem, solution
+class _Rounds(NamedTuple):
+    """Rounds of least squares, each with the weights and the noise of the one before."""
+
+    problem: Problem  # without weights by the loss
+    solve: Callable[[Problem, int | None], Solution]
+    loss: str
+    noise: Callable[[Problem, SearchEnd], Noise]
+    spread: float | None
+    most: int
+
+    def settled(self, now: Round, solution: Solution) -> tuple[Round, Solution]:
+        """The last round and its solution, from one round and its solution on."""
+        for _ in range(self.most):
+            best = solution.best
+            if not best.finite or self.problem.is_rounding(best.squares):
+                break
+            level = self.noise(now.problem, best).level
+            after = now.after(self.problem, best.residual, level, self.loss, self.spread)
+            if after is None:
+                break
+            now, solution = after, self.searched(after, best)._replace(noise=level)
+            length = np.linalg.norm(solution.best.jacobian, axis=0)
+            moved = np.abs(solution.best.values - best.values) * length
+            if np.all(moved < SETTLED * level):
+                break
+        return now, solution
+
+    def searched(self, now: Round, end: SearchEnd) -> Solution:
+        """The solution of a round, searched from the end of another one."""
+        return self.solve(now.problem.started_at(end.values), 1)
+
+    def better(self, other: tuple[Round, Solution], than: tuple[Round, Solution]) -> bool:
+        """Whether one solution has less of the loss than another, whose robust standard deviation is taken."""
+        used = self.problem.used
+        missed = [solution.best.residual / now.root for now, solution in (other, than)]
+        unit, value = _unit(missed[1][used], self.loss, self.spread), LOSSES[self.loss].value
+        costs = [unit**2 * value(each[used] / unit).sum() + float(each[~used] @ each[~used]) for each in missed]
+        return bool(costs[0] < costs[1])
+
+
+def _in_rounds(by: _Rounds, first: Solution) -> tuple[Problem, Solution]:
+    """The last round, and its solution with the other minima of the first one, searched on with the last weights.
+
+    As weights of one minimum make others look worse, those nearly as good have own rounds; the least loss is the best.
+    """
+    best = by.settled(Round(by.problem), first)
+    if best[1] is first:
+        return by.problem, first
+    groups, chosen = distinct_ends(first, (best[1].noise or 0.0) ** 2), 0
+    others = [by.searched(best[0], end) for end, _ in groups[1:]]
+    for i, other in enumerate(others, 1):
+        if other.best.squares < PROMISING * best[1].best.squares:
+            followed = by.settled(best[0], other)
+            best, chosen = (followed, i) if by.better(followed, best) else (best, chosen)
+    now, solution = best
+    if chosen:
+        groups.insert(0, groups.pop(chosen))
+        others = [by.searched(now, end) for end, _ in groups[1:]]
+    counted = zip([solution, *others], (count for _, count in groups), strict=True)
+    return now.problem, solution._replace(ends=_as_often(counted, solution.best), starts=first.starts)
+
+
+def _as_often(counted: Iterable[tuple[Solution, int]], best: SearchEnd) -> tuple[SearchEnd, ...]:
+    """Each end as often as searches ended in its minimum; beside the best none that did not converge."""
+    ends = (end for one, count in counted for end in [one.best] * count)
+    return tuple(end for end in ends if end.finite and (end.converged or end is best))
 
 
 def against_priors(

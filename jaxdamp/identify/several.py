@@ -246,7 +246,20 @@ def _apart(end: SearchEnd, other: SearchEnd) -> float:
 
 
 def minima_of(solution: Solution, names: Sequence[str], variance: float) -> tuple[Minimum, ...]:
-    """The minima in which the searches ended, the best first.
+    """The minima in which the searches ended, the best first."""
+    best = solution.best
+    return tuple(
+        Minimum(
+            dict(zip(names, map(float, end.values), strict=True)),
+            max(end.squares - best.squares, 0.0) / variance if variance > 0 else 0.0,
+            count,
+        )
+        for end, count in distinct_ends(solution, variance)
+    )
+
+
+def distinct_ends(solution: Solution, variance: float) -> list[tuple[SearchEnd, int]]:
+    """One end of each minimum, the best first, and how many searches ended there.
 
     Two ends are the same minimum if their sums of squares differ by less than the noise, and if by the Jacobian of the
     better one their parameters give almost the same force.
@@ -260,11 +273,4 @@ def minima_of(solution: Solution, names: Sequence[str], variance: float) -> tupl
                 break
         else:
             groups.append((end, 1))
-    return tuple(
-        Minimum(
-            dict(zip(names, map(float, end.values), strict=True)),
-            max(end.squares - best.squares, 0.0) / variance if variance > 0 else 0.0,
-            count,
-        )
-        for end, count in groups
-    )
+    return groups

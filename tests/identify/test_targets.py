@@ -101,6 +101,26 @@ def test_searches_leave_a_start_of_equal_zeros_where_the_derivatives_do_not_show
 
 
 @pytest.mark.parametrize(
+    ("options", "best"),
+    [({}, 1.0), ({"priors": {"x": (2.0, 10.0)}}, 1.0), ({"loss": "huber"}, 3.0), ({"loss": "student_t"}, 3.0)],
+)
+def test_the_other_minimum_is_kept_and_compared_by_the_loss(options, best):
+    """At 3 one target is far off, at 1 all three a little. With a loss or priors it was lost, and one start named."""
+
+    def numbers(p):
+        s = 0.5 * (p["x"] - 1.0)
+        near = {name: 2.0 * (1.0 - s) + missed * s for name, missed in (("a", 0.1), ("b", 0.1), ("c", 4.0))}
+        return {**near, "wall": 20.0 * (p["x"] - 1.0) * (p["x"] - 3.0)}
+
+    targets = {name: (0.0, 1.0) for name in ("a", "b", "c", "wall")}
+    result = identify.fit_targets(numbers, {"x": 1.7}, targets, **options)
+    assert result.starts == 4 and not any("Only one start" in w for w in result.warnings)
+    ends = [minimum.values["x"] for minimum in result.minima]
+    assert ends == pytest.approx([best, 4.0 - best], abs=0.01)
+    assert [minimum.starts for minimum in result.minima] == ([3, 1] if best == 1.0 else [1, 3])
+
+
+@pytest.mark.parametrize(
     ("start", "targets", "options", "message"),
     [
         ({"a": 1.0}, {}, {}, "`targets` must be numbers by name"),
