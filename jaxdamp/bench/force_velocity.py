@@ -196,24 +196,36 @@ def read_table(
     choice = Choice(given["columns"] or {}, given["units"] or {})
     sheets, readers = find_files(asked, {*FOLDER_SUFFIXES, *(files["readers"] or {})}), with_own(files["readers"])
     notes, sides, problems, sign, stated = [*notes], [], Problems(), given["sign"], set()
+    others: dict[Path, str] = {}
     for file in sheets:
         with problems.collected(str(file)):
             tables = [with_headers(table) for table in read_tables(file, readers, given["delimiter"])]
             fitting = [table for table in tables if is_force_velocity(table, choice)]
             if not fitting:
-                there = ", ".join(name for table in tables for name in table.names)
-                what = "which has a velocity, forces and no time"
-                raise ValueError(f"{file} is no force-velocity table, {what}: its columns are {there}.")
+                others[file] = ", ".join(name for table in tables for name in table.names)
             for table in fitting:
                 stated.add(stated_sign(table))
                 two_sides, said = sides_of(table, choice)
                 sides += two_sides
                 notes += said
     problems.raise_any()
+    _refuse_others(others, sheets)
     sign = stated.pop() if sign is None and len(stated) == 1 else sign
     curves, said = curves_of(sides, sign, side)
     name, of_files = _called(sheets)
     return ForceVelocityTable(name, curves, tuple(dict.fromkeys([*notes, *of_files, *said])))
+
+
+def _refuse_others(others: Mapping[Path, str], files: Sequence[Path]) -> None:
+    """Refuse files that are no force-velocity tables, given with their columns."""
+    if not others:
+        return
+    file, columns = next(iter(others.items()))
+    what = "no force-velocity table, which has a velocity, forces and no time"
+    tables = ", ".join(str(each) for each in files if each not in others)
+    more = f" Further files that are none: {len(others) - 1}." * (len(others) > 1)
+    apart = f" Give {tables} apart from records." * bool(tables)
+    raise ValueError(f"{file} is {what}: its columns are {columns}.{more}{apart}")
 
 
 def _called(files: Sequence[Path]) -> tuple[str, list[str]]:

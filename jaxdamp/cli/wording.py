@@ -67,6 +67,7 @@ CALLS = {
     r"`bounds=\{[^`]*`": "--bound",
     r"Pass `tyre_lifts=True` to the vehicle": "Write tyre_lifts = true into a vehicle file (docs/vehicles.md)",
     r"`process\(delay=[^)]*\)`": "fit with --rig offset,delay",
+    r"together, `Scenarios\(\[[^`]*`": "together, jaxdamp tune --roads 4",
     r"with `jaxdamp\.parameters\.replace\([^']*'([^']*)'[^`]*`": r"with \1 = NUMBER below [parameters] of VEHICLE.toml",
 }
 """Calls of Python in the sentences of the library, as patterns, and what the command line says instead."""

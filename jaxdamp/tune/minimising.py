@@ -29,6 +29,7 @@ from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import DEFAULTS, Settings
 from jaxdamp.tune.task import DesignTask, Evaluator, check_call, is_white
 from jaxdamp.tune.verdict import (
+    Outcome,
     active_words,
     bound_notes,
     early_end,
@@ -140,6 +141,7 @@ def minimise(
             fresh = _on_fresh_roads(evaluator, (task.space.start, ended.values), others, allowed)
         attempts = _attempts(task, starts, several, limits) if len(several) > 1 else ()
         result = _result(task, evaluations[0], ended, attempts, (limits, tighter), fresh, settings)
+        result = dataclasses.replace(result, warnings=(*_of_one_road(result), *result.warnings))
     driven = descent.combinations(tighter) if isinstance(descent, Driven) else None
     combinations = None if driven is None else _beside_next(evaluator, driven, fresh_roads)
     return dataclasses.replace(result, combinations=combinations)
@@ -302,6 +304,18 @@ def _on_fresh_roads(
         if decided(driven, allowed):
             break
     return driven
+
+
+def _of_one_road(result: TuneResult[V]) -> list[str]:
+    """What to do where the optimum on the one random road of a tuning is not better on others."""
+    if (
+        result.fresh is None
+        or result.scenarios
+        or result.verdict.outcome not in (Outcome.NOT_BETTER, Outcome.NOT_SHOWN)
+    ):
+        return []
+    several = "`Scenarios([road, road.reseeded(1), road.reseeded(2), road.reseeded(3)])`"
+    return [f"One realisation of a road has an optimum of its own. Tune on four together, {several}, or on a longer one."]
 
 
 def _where_it_holds(road: Road | Scenarios, fresh_roads: int) -> str:

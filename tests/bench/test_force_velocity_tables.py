@@ -75,6 +75,16 @@ def test_what_the_file_does_not_say_is_asked_for(tmp_path, text, options, words)
     assert words in str(caught.value)
 
 
+def test_of_tables_among_records_the_tables_are_named(tmp_path):
+    records = [tmp_path / "1.csv", tmp_path / "2.csv"]
+    for record in records:
+        record.write_text("t_s,x_mm,F_N\n0,0,20\n1,1,50\n")
+    table = written(tmp_path, "v [m/s],F [N]\n-0.1,-20\n0.1,50\n")
+    with pytest.raises(ValueError) as caught:
+        bench.read_table([table, *records])
+    assert f"are t_s, x_mm, F_N. Further files that are none: 1. Give {table} apart from records." in str(caught.value)
+
+
 @pytest.mark.parametrize("sign", ["rebound-positive", "compression-positive"])
 def test_the_table_of_a_law_says_its_sign(tmp_path, sign):
     law = Bilinear(2600.0, 1200.0)

@@ -16,7 +16,7 @@ from distributed import Client, LocalCluster
 
 import jaxdamp
 from jaxdamp import identify
-from jaxdamp.bench import DamperRecords, SineTest, VirtualDyno
+from jaxdamp.bench import BenchRun, DamperRecords
 from jaxdamp.dampers import Bilinear
 from jaxdamp.sweeps import points, random
 
@@ -45,11 +45,15 @@ def ending(point):
 
 def made(i):
     """Records of a damper of a line."""
-    law = Bilinear(2000.0 + i % 100, 1200.0)
-    return VirtualDyno(law, force_noise=4.0, sampling_rate=100.0, seed=i).run(SineTest(0.02, 1.0))
+    angle = 2.0 * np.pi * TIME
+    velocity = 0.04 * np.pi * np.cos(angle)
+    force = np.where(velocity > 0.0, 2000.0 + i % 100, 1200.0) * velocity
+    noise = np.random.default_rng(i).normal(0.0, 4.0, TIME.shape)
+    return BenchRun("1 Hz", TIME, 0.02 * np.sin(angle), velocity, force + noise)
 
 
-DAMPERS = DamperRecords(made, range(256))
+TIME = np.arange(300) / 100.0
+DAMPERS = DamperRecords(made, range(192))  # three blocks: while two workers compute, one is killed
 
 
 def start():
@@ -67,10 +71,11 @@ def main(folder: Path, kill: str) -> None:
         Client(cluster) as client,
     ):
         pids: dict[str, int] = client.run(os.getpid)  # pyright: ignore[reportAssignmentType]
-        workers = list(pids.values())
+        workers, kills = list(pids.values()), []
 
         def told(done: int, _: int) -> None:
             if done == (64 if kill == "fits" else 4 * BLOCK) and kill != "nobody":
+                kills.append(done)
                 os.kill(workers[0] if kill in ("worker", "fits") else os.getpid(), signal.SIGKILL)
 
         if kill == "point":
@@ -78,6 +83,7 @@ def main(folder: Path, kill: str) -> None:
             return
         if kill == "fits":
             identify.fit_many(start(), DAMPERS, file=folder / "fits.zarr", cluster=client, progress=told)
+            assert kills == [64]
             return
         data = jaxdamp.sweep(decay(), POINTS, file=folder / f"{kill}.zarr", cluster=client, progress=told)
         assert data.attrs["points_done"] == POINTS.count

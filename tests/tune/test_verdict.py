@@ -338,3 +338,14 @@ def test_percentiles_over_fresh_roads():
     assert fresh.percentile(COMFORT, 50.0) == (1.0, 2.0) and fresh.percentile(COMFORT, 75.0) == (1.0, 3.0)
     with pytest.raises(ValueError, match="`percent`"):
         fresh.percentile(fresh.metric, 101.0)
+
+
+@pytest.mark.slow
+def test_the_optimum_of_one_road_that_is_not_better_on_others_names_what_is():
+    road = [roads.iso8608("C", speed=20.0, length=100.0, seed=seed) for seed in range(4)]
+    how: dict[str, Any] = dict(metric=COMFORT, vehicle=presets.quarter_car_000(dampers.Linear(4700.0)))
+    one, four = (tune.minimise(road=r, dt=2e-3, **how) for r in (road[0], tune.Scenarios(road)))
+    assert one.verdict.outcome is Outcome.NOT_BETTER and "Tune on four together" in one.warnings[0]
+    assert not [text for text in four.warnings if "Tune on four" in text]
+    assert one.fresh is not None and four.fresh is not None
+    assert four.fresh.change(COMFORT).mean() < one.fresh.change(COMFORT).mean()
