@@ -225,7 +225,7 @@ def _shown(data: Contents) -> Contents:
     """Units and sign in which the page shows its numbers, which are in SI: for each unit another one and the factor."""
     numbers = [*data["law"]["numbers"], *data["vehicle"]["numbers"], *data["metrics"], *data["channels"]]
     units, shown = sorted({number["unit"] for number in numbers} | {"N", "m", "m/s"}), display()
-    others = {unit: [other.unit, other.factor] for unit in units if (other := shown.of(unit)).factor != 1.0}
+    others = {unit: [other.unit, other.factor] for unit in units if (other := shown.read(unit)).factor != 1.0}
     return {"units": others, "turned": shown.sign == COMPRESSION}
 
 
@@ -234,9 +234,8 @@ def _units_in_words(shown: Display) -> str:
     stroke = "Stroke and velocity are positive in rebound (extension), force is positive when it resists extension."
     if shown.sign == COMPRESSION:
         stroke = "Stroke, velocity and force are positive in compression; formulas count rebound positive."
-    return (
-        f"{'SI units' if shown.units == 'SI' else f'Units {shown.units}; speed, bump and sines as written'}. {stroke}"
-    )
+    units = "SI units, mm and N/mm" if shown.units == "SI" else f"Units {shown.units}"
+    return f"{units}; speed, bump and sines as written. {stroke}"
 
 
 def _row(point: Point, vehicle: AbstractVehicle) -> list[float]:

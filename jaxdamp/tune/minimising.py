@@ -314,8 +314,8 @@ def _of_one_road(result: TuneResult[V]) -> list[str]:
         or result.verdict.outcome not in (Outcome.NOT_BETTER, Outcome.NOT_SHOWN)
     ):
         return []
-    several = "`Scenarios([road, road.reseeded(1), road.reseeded(2), road.reseeded(3)])`"
-    return [f"One realisation of a road has an optimum of its own. Tune on four together, {several}, or on a longer one."]
+    several = "four together, `Scenarios([road, road.reseeded(1), road.reseeded(2), road.reseeded(3)])`"
+    return [f"One realisation of a road has an optimum of its own. Tune on {several}, or on a longer one."]
 
 
 def _where_it_holds(road: Road | Scenarios, fresh_roads: int) -> str:
