@@ -21,6 +21,7 @@ from jaxdamp.identify.dependence import OWN, Dependence
 from jaxdamp.identify.estimates import rounded
 from jaxdamp.identify.estimating import WEAK
 from jaxdamp.identify.initial_states import DRIFT
+from jaxdamp.identify.many_remarks import on_few, on_most, robust_scores, trend, undetermined
 from jaxdamp.identify.model import Model, law_of, rig_of, with_range
 from jaxdamp.identify.settings import FitSettings
 from jaxdamp.identify.stated import stated_parameters, with_stated
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 
 
 OUTLYING = 6.0  # robust standard deviations from the other dampers from which one is named
-LEAST_SPREAD = 0.02  # of the median: numbers that differ by less do not make a damper stand out
 NOT_COUNTED = 0.02  # share of samples with little weight, above that of the others, from which it is named
 ONE_RECORD = 1.5  # times the RMSE of the other records, from which one is named as the cause
 CERTAIN = 4.0  # standard errors by which it must differ as well
@@ -222,7 +222,7 @@ class ManyFits(AbstractResult):
         for i in np.flatnonzero(self.drift > DRIFT):
             texts[i].append(f"its states are not periodic: over a cycle they still change by {self.drift[i]:.2g}")
         misfit = 100.0 - self.fit_percent
-        for i, score in zip(fitted, _robust_scores(misfit[fitted], None), strict=True):
+        for i, score in zip(fitted, robust_scores(misfit[fitted], None), strict=True):
             if score > OUTLYING:
                 times = misfit[i] / np.median(misfit[fitted])
                 texts[i].append(f"its error is {times:.2g} times that of the others{self._mostly_of(int(i))}")
@@ -231,13 +231,20 @@ class ManyFits(AbstractResult):
                 texts[i].append(f"{100.0 * share:.2g} % of its samples have less than half weight")
         for j, name in enumerate(self.parameters):
             values = self.values[fitted, j]
-            expected, scores = _trend(values, settings), _robust_scores(values, settings)
+            expected, scores = trend(values, settings), robust_scores(values, settings)
             apart = np.abs(values - expected)
             sure = (np.abs(scores) > OUTLYING) & (apart > CERTAIN * self.standard_errors[fitted, j])
             for k in np.flatnonzero(sure):
                 unit = f" {self.free.owners[j].unit}".rstrip()
                 suggested = f"{expected[k]:.4g}{unit}"
                 texts[fitted[k]].append(f"{name} = {values[k]:.4g}{unit} where the others suggest {suggested}")
+        for i, words in zip(fitted, on_few(self.parameters, self._undetermined), strict=True):
+            texts[i] += [words] if words else []
+
+    @functools.cached_property
+    def _undetermined(self) -> np.ndarray:
+        """Which numbers the records of each damper that was fitted do not determine."""
+        return undetermined(self.free, self.values[self._fitted], self.standard_errors[self._fitted])
 
     def _biased(self, i: int) -> list[str]:
         """The numbers of a damper that the noise of stroke and velocity biases by more than their standard errors."""
@@ -316,8 +323,9 @@ class ManyFits(AbstractResult):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """The remark on each damper that has one."""
-        return tuple(f"{name}: {remark}" for name, remark in zip(self.names, self.remarks, strict=True) if remark)
+        """What the records of most dampers do not determine, and the remark on each damper that has one."""
+        remarks = (f"{name}: {remark}" for name, remark in zip(self.names, self.remarks, strict=True) if remark)
+        return (*on_most(self.parameters, self._undetermined), *remarks)
 
     def __repr__(self) -> str:
         return "\n".join([self.summary, *self.warnings])
@@ -328,23 +336,3 @@ class ManyFits(AbstractResult):
         worst = int(np.argmax(errors))
         alone = len(errors) > 1 and errors[worst] > ONE_RECORD * np.median(np.delete(errors, worst))
         return f", mostly of {self.records[i][worst].name!r} with an RMSE of {errors[worst]:.3g} N" if alone else ""
-
-
-def _trend(values: np.ndarray, settings: tuple[float, ...] | None) -> np.ndarray:
-    """The median, or with settings a line through the medians of slopes and levels (Theil and Sen)."""
-    if settings is None or np.ptp(settings) == 0:
-        return np.full(values.shape, np.median(values))
-    x = np.array(settings)
-    first, second = np.triu_indices(x.size, 1)
-    apart = x[second] != x[first]
-    slope = np.median((values[second] - values[first])[apart] / (x[second] - x[first])[apart])
-    return slope * x + np.median(values - slope * x)
-
-
-def _robust_scores(values: np.ndarray, settings: tuple[float, ...] | None) -> np.ndarray:
-    """Distances from the trend in deviations, as the median of distances gives them; zero for four dampers or fewer."""
-    if values.size < 5:
-        return np.zeros(values.shape)
-    trend = _trend(values, settings)
-    spread = max(1.4826 * np.median(np.abs(values - trend)), LEAST_SPREAD * np.median(np.abs(values)))
-    return (values - trend) / spread if spread > 0 else np.zeros(values.shape)
