@@ -1,4 +1,4 @@
-"""Notes on a response: laws beyond the range of their fit, tyres in tension, commands at their limits."""
+"""Notes on a response: laws beyond their fit or their strokes, tyres in tension, commands at their limits."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
@@ -125,6 +125,32 @@ def without_motion(motion: Float[np.ndarray, "time n"], road: Float[np.ndarray, 
     if np.any(road != road[0]) or np.any(motion != motion[0]):
         return ()
     return ("Nothing moves, as the road stays level. If it has a bump later, pass a longer `duration`.",)
+
+
+def beyond_strokes(
+    system: System, motion: Float[np.ndarray, "time n"], road: Float[np.ndarray, "time wheels"]
+) -> tuple[str, ...]:
+    """A sentence on each damper that was longer or shorter than its law can be, such as a tube without oil or gas left.
+
+    Arguments:
+        system: the vehicle.
+        motion: coordinates and their rates [m, m/s] at each instant.
+        road: heights [m].
+    """
+    limits = [np.array([[*map(float, term.stroke_limits)] for term in law.side_by_side()]) for law in system.laws]
+    if not any(np.isfinite(each).any() for each in limits):
+        return ()
+    form = jax.tree.map(np.asarray, system.form)
+    strokes, texts = np.asarray(form.at_ports(motion[:, : motion.shape[1] // 2], road)), []
+    for name, each, stroke in zip(system.layout.ports, limits, strokes.T, strict=True):
+        low, high = each[:, 0].max(), each[:, 1].min()
+        if share := float(np.mean((stroke < low) | (stroke > high))):
+            texts.append(
+                f"The {name.replace('_', ' ')} moved from {stroke.min():.3g} to {stroke.max():.3g} m, but its law is "
+                f"valid from {low:.3g} to {high:.3g} m ({100.0 * share:.2g} % of the run outside). Add a `BumpStop`, "
+                "or state the volumes at this static position."
+            )
+    return tuple(texts)
 
 
 LEAST = 1e-3  # of the static load, by which a load must be below zero

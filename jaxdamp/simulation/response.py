@@ -24,6 +24,7 @@ from jaxdamp.simulation.energy import absorbed_by, energy_balance
 from jaxdamp.simulation.engine import FirstRows
 from jaxdamp.simulation.notes import (
     Delivery,
+    beyond_strokes,
     commands_at_limits,
     deliveries,
     jumps_counted_late,
@@ -138,7 +139,7 @@ class Response(eqx.Module, AbstractResult):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Tyres that pulled, dampers beyond the fitted range of their laws, commands at limits or that jump, no motion.
+        """Tyres that pulled, dampers beyond the range or strokes of their laws, commands at limits or jumps, no motion.
 
         Empty while JAX traces.
         """
@@ -149,8 +150,9 @@ class Response(eqx.Module, AbstractResult):
         if self.commands is not None:
             run = self.system, self.dt, self.every, np.asarray(self.commands)
             limits = (*commands_at_limits(*run), *jumps_counted_late(*run, self.__getitem__))
-        still = without_motion(np.asarray(self.motion), np.asarray(self.road))
-        return (*still, *tyres, *range_sentences(self.range_use()), *limits)
+        moved = np.asarray(self.motion), np.asarray(self.road)
+        beyond = beyond_strokes(self.system, *moved)
+        return (*without_motion(*moved), *tyres, *beyond, *range_sentences(self.range_use()), *limits)
 
     warnings = notes
 

@@ -98,3 +98,17 @@ def test_nothing_to_note_on_a_smooth_road_and_none_while_traced():
 
     run(2500.0)
     assert found == [()]
+
+
+def test_a_damper_beyond_its_stroke_says_so():
+    """The piston of a tube was pulled through the guide of its rod without a word."""
+    tube, bump = dampers.MonoTube.reference(), roads.cosine_bump(0.3, start=0.1, length=3.0, speed=15.0)
+    car = presets.quarter_car_000(dampers.MotionRatio(tube, 0.8), tyre_lifts=True)
+    response = simulate(car, bump, duration=0.5)
+    stroke, (low, high) = np.asarray(response["stroke"]), (np.asarray(tube.stroke_limits) / 0.8).tolist()
+    assert stroke.max() > high
+    share = 100.0 * np.mean(stroke > high)
+    (note,) = response.notes
+    assert f"damper moved from {stroke.min():.3g} to {stroke.max():.3g} m" in note
+    assert f"valid from {low:.3g} to {high:.3g} m ({share:.2g} % of the run outside)" in note
+    assert "valid from" not in str(response.between(0.0, 0.1).notes)
