@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from jaxdamp._tables import Column, Contents, Table, plain, typeset_unit
-from jaxdamp.tune.limits import percentage
+from jaxdamp.tune.limits import amount, percentage
 from jaxdamp.tune.rescoring import Rescore
 from jaxdamp.tune.verdict import relative_change
 
@@ -44,7 +44,8 @@ class Combinations:
 
     def at(self, place: int) -> str:
         """One combination in words, the best being the first."""
-        return ", ".join(f"{name} = {values[place]:.6g}" for name, values in self.choices.items())
+        numbers = ((name, amount(values[place], self.units[name], digits=6)) for name, values in self.choices.items())
+        return ", ".join(f"{name} = {number}" for name, number in numbers)
 
     def table(self) -> Table:
         """A row for each combination: its numbers, its metrics, and whether it meets the limits."""

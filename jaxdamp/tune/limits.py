@@ -73,14 +73,15 @@ class Limit(NamedTuple):
         return f"{sign} {amount(end, self.unit)}"
 
 
-def amount(value: float, unit: str, *before: float, link: str = " -> ") -> str:
+def amount(value: float, unit: str, *before: float, link: str = " -> ", digits: int = 4) -> str:
     """A value with its unit as people read it; with others before it, that are linked to it.
 
     >>> amount(0.1, "m"), amount(0.75, "m/s^2", 0.8), amount(0.02, "m", 0.01, link=" to ")
     ('100 mm', '0.8 -> 0.75 m/s²', '10 to 20 mm')
     """
     shown = Display().read(unit)  # where others are shown, sentences are brought to them as a whole
-    return f"{link.join(f'{shown(one):.4g}' for one in (*before, value))} {typeset_unit(shown.unit)}".rstrip()
+    numbers = link.join(f"{shown(one):.{digits}g}" for one in (*before, value))
+    return f"{numbers} {typeset_unit(shown.unit)}".rstrip()
 
 
 def percentage(change: float, half_width: float = math.nan) -> str:

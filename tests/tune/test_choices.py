@@ -65,6 +65,7 @@ def test_a_choice_that_needs_more_steps_than_the_start_is_driven_with_them() -> 
     scenarios = tune.Scenarios([bump], [tune.Condition({"unsprung_mass": 30.0})])  # a wheel that needs more steps
     result = tune.minimise(travel, CAR, scenarios, over={"damper.rate": tune.Choice(rates)}, **run)
     assert float(get(result.vehicle, "damper.rate")) == 200e3 and result.combinations is not None
+    assert result.combinations.at(0) == "damper.rate = 200000 N s/m"
     light = replace(CAR, {"unsprung_mass": 30.0, "damper.rate": 200e3})
     alone = Ride(light, bump, metrics=[travel], **run)
     assert alone.substeps > 1 and result.after[travel] == pytest.approx(float(alone()[travel]), rel=1e-9)
