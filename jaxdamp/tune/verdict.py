@@ -134,19 +134,21 @@ def _change(result: "TuneResult[AbstractVehicle]") -> tuple[float, str]:
     if fresh is None or not np.all(np.isfinite(fresh.change(name))):
         here = change_in_percent(result, name, result.before[name], result.after[name])
         sides = result.before[name], result.after[name]
-        share = _from_to(result, name, *sides) if here is None else percentage(here)
+        share = amount(sides[1], result.units[name], sides[0]) if here is None else percentage(here)
         change = relative_change(*sides)  # a change from zero is judged as one of 100 %, whatever the unit
         change = 100.0 * float(np.sign(sides[1] - sides[0])) if change is None else change
         return change, f"{name} {share} {result.elsewhere or 'on the road of the tuning'}"
     mean, half = 100.0 * float(np.mean(fresh.change(name))), 100.0 * fresh.half_width(name)
-    roads = f"{fresh.roads} fresh roads" if fresh.roads > 1 else "1 fresh road, which gives no interval"
+    roads = _fresh_roads(result) if fresh.roads > 1 else "1 fresh road, which gives no interval"
     sides = float(fresh.before[name].mean()), float(fresh.after[name].mean())
-    share = _from_to(result, name, *sides) if signed else percentage(mean, half)
+    share = amount(sides[1], result.units[name], sides[0]) if signed else percentage(mean, half)
     return mean, f"{name} {share} on {roads}"
 
 
-def _from_to(result: "TuneResult[AbstractVehicle]", name: str, before: float, after: float) -> str:
-    return amount(after, result.units[name], before)
+def _fresh_roads(result: "TuneResult[AbstractVehicle]") -> str:
+    """How many fresh roads there are, in words; of a tuning in scenarios each draw is one of all their roads."""
+    count = 0 if result.fresh is None else result.fresh.roads
+    return f"{count} fresh {'draws of the roads' if result.scenarios else 'roads'}"
 
 
 def _price(result: "TuneResult[AbstractVehicle]") -> tuple[float, str]:
@@ -189,7 +191,7 @@ def _limits_in_words(result: "TuneResult[AbstractVehicle]") -> str:
         if (fresh := result.fresh) is not None and name in result.allowed:
             over = [excess(fresh, one, span) for one, span in _allowed(result, name).items()]
             beyond = int(np.sum(np.max(over, axis=0) > _ROUNDING))
-            text += f", beyond it on {beyond} of {fresh.roads} fresh roads" * bool(beyond)
+            text += f", beyond it on {beyond} of {_fresh_roads(result)}" * bool(beyond)
         texts.append(text)
     return f"; limits: {'; '.join(texts)}" if texts else ""
 

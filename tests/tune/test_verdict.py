@@ -347,5 +347,6 @@ def test_the_optimum_of_one_road_that_is_not_better_on_others_names_what_is():
     one, four = (tune.minimise(road=r, dt=2e-3, **how) for r in (road[0], tune.Scenarios(road)))
     assert one.verdict.outcome is Outcome.NOT_BETTER and "Tune on four together" in one.warnings[0]
     assert not [text for text in four.warnings if "Tune on four" in text]
+    assert "fresh roads" in one.summary and "fresh draws of the roads" in four.summary  # each draw is of all four
     assert one.fresh is not None and four.fresh is not None
     assert four.fresh.change(COMFORT).mean() < one.fresh.change(COMFORT).mean()
