@@ -154,5 +154,12 @@ def followed_channels(model: Model, runs: Sequence[BenchRun]) -> list[str]:
     warms = law.traits().temperature_dependent or any(np.any(np.asarray(slope)) for slope in slopes)
     if not warms or all(run.temperature is None for run in runs):
         return channels + varying
-    refuse_lacking("temperature", [run for run in runs if run.temperature is None], APART)
+    _check_temperatures(runs)
     return [*channels, "temperature", *varying]
+
+
+def _check_temperatures(runs: Sequence[BenchRun]) -> None:
+    """Refuse records without a measured temperature, and those that have it in degrees Celsius."""
+    refuse_lacking("temperature", [run for run in runs if run.temperature is None], APART)
+    for run in runs:
+        _checks.kelvin(f"temperature of {run.name!r}", channel(run, "temperature"))

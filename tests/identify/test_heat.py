@@ -187,6 +187,15 @@ def test_a_scaled_law_takes_one_temperature_a_record_a_channel_or_its_own():
     assert result.score(other)[1] > 30.0 and result.score(warm(40.0, 2.0, 2))[1] < 6.0  # its own is 40 °C
 
 
+def test_a_measured_temperature_in_celsius_is_refused():
+    """Two records at 20 and 60 °C, given so, had a sixth of the rates: a law at 293 K that is told of 20 K."""
+    run = record(0.0, 0.02, 1.0, 0, Linear(2000.0))
+    cold, warm = (dataclasses.replace(run, temperature=np.full(len(run), celsius)) for celsius in (20.0, 60.0))
+    for law in (TemperatureScaled(Linear(1500.0), 293.15), Heated(Linear(1500.0))):
+        with pytest.raises(ValueError, match=r"`temperature of '20mm_1Hz'` must be in kelvin.* write it plus 273\.15"):
+            fit(law, [cold, warm], bad_records="keep")
+
+
 @pytest.mark.slow
 def test_a_machine_that_tells_heat_begins_with_the_stated_temperature_too():
     machine = Rig(temperature_slope=0.004, heating=1 / 400, cooling=1 / 300)
