@@ -45,7 +45,8 @@ class Spread(NamedTuple):
     Attributes:
         log_deviation: logarithm of the standard deviations, shape (laws, variables).
         tilt: artanh of the correlation of each variable with those before it, shape (laws, pairs).
-        mean: in multiples of the first standard deviations, shape (laws, variables).
+        mean: arsinh of its multiple of the first standard deviation, as it can be a hundred times as large (the heat of
+            a damper), shape (laws, variables).
     """
 
     log_deviation: Float[Array, "laws variables"]
@@ -212,7 +213,7 @@ def _first(system: System, kinds: Sequence[_Kind], owners: Sequence[int]) -> lis
     means = motions_of(system, owners, states).state @ place
     pairs = [len(kind.curved) * (len(kind.curved) - 1) // 2 for kind in kinds]
     return [
-        Spread(jnp.log(kind.scale), jnp.zeros((len(kind.scale), count)), means[_chosen(kind)] / kind.scale)
+        Spread(jnp.log(kind.scale), jnp.zeros((len(kind.scale), count)), jnp.arcsinh(means[_chosen(kind)] / kind.scale))
         for kind, count in zip(kinds, pairs, strict=True)
     ]
 
@@ -247,7 +248,7 @@ def _nearest_of_one(
 ) -> tuple[Array, Array]:
     """Constant and slopes by (v, x, s) of one law: E[y tᵀ] L⁻¹ for z = z̄ + L t with uncorrelated t of variance one."""
     count, places = 2 + law.initial_state().size, np.array(curved, dtype=int)
-    mean = spread.mean * scale
+    mean = jnp.sinh(spread.mean) * scale
     placing = np.eye(count, dtype=mean.dtype)[:, places]
 
     def at(curved_values: Array) -> Array:
@@ -303,7 +304,7 @@ def _distributions(
         row, column = np.tril_indices(size, -1)
         correlation = covariances[:, row, column] / (deviation[:, row] * deviation[:, column])
         tilt = jnp.arctanh(within(correlation, -_STRAIGHT, _STRAIGHT))
-        spreads.append(Spread(log_deviation, tilt, means[chosen] / kind.scale))
+        spreads.append(Spread(log_deviation, tilt, jnp.arcsinh(means[chosen] / kind.scale)))
     return spreads
 
 

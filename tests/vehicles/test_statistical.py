@@ -72,6 +72,16 @@ def test_friction_is_a_damper_of_slope_sqrt_2_over_pi_times_force_over_velocity(
     assert found.words() == f"Gaussian, equivalent slope {found.slope:.0f} N s/m at 0.24 m/s RMS"
 
 
+def test_a_damper_is_as_hot_as_its_losses_make_it():
+    """ϑ = c σ² τ/C, c = c₀ exp(−κ ϑ): far from what one stroke adds, so that none was found."""
+    law = dampers.Heated(dampers.Linear(3000.0), sensitivity=0.004, cooling_time=600.0, static_force_slope=-0.5)
+    found = equivalent_dampers(quarter_car_000(law), ROAD.velocity_psd)["damper"]
+    rise = float(found.slope * found.velocity_rms**2) * 600.0 / 1000.0
+    assert rise > 50.0 and float(found.slope) == pytest.approx(3000.0 * np.exp(-0.004 * rise), rel=1e-8)
+    same = equivalent_dampers(quarter_car_000(dampers.Linear(found.slope)), ROAD.velocity_psd)["damper"]
+    assert float(found.velocity_rms) == pytest.approx(float(same.velocity_rms), rel=1e-8)
+
+
 @pytest.mark.parametrize("road", [roads.white("A", 5.0), roads.white(1e-12, 1.0)])
 @pytest.mark.parametrize(
     "law", [FRICTION, pytest.param(dampers.Linear(1500.0) + dampers.Dahl(5e5, 150.0), marks=pytest.mark.slow)]
