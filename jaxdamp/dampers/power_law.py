@@ -7,8 +7,11 @@ import numpy as np
 
 from jaxdamp._elementary import power, reciprocal_root
 from jaxdamp._types import Number, Scalar, ScalarLike
-from jaxdamp.dampers.base import AbstractMemoryless
+from jaxdamp.dampers.base import AbstractMemoryless, Reach
 from jaxdamp.parameters import nonnegative, parameter, positive, setting
+
+
+NEXT_TO_NONE = 0.01  # of the force of the other side, below which no search finds an exponent
 
 
 @final
@@ -42,6 +45,16 @@ class PowerLaw(AbstractMemoryless):
         offset = jnp.where(rebound, self.rebound_offset, self.compression_offset)
         exponent = jnp.where(rebound, self.rebound_exponent, self.compression_exponent)
         return v * (force * power(square, 0.5 * (exponent - 1.0)) + offset * reciprocal_root(square))
+
+    def other_starts(self, reach: Reach) -> list[dict[str, float]]:
+        """A straight line with the force of the other side, for a side that has next to none within the records."""
+        rebound, compression = (abs(float(self.force_velocity(v))) for v in (reach.velocity, -reach.velocity))
+        sides = (("rebound", rebound, compression), ("compression", compression, rebound))
+        return [
+            {f"{side}_force": other / reach.velocity, f"{side}_exponent": 1.0}
+            for side, force, other in sides
+            if force < NEXT_TO_NONE * other
+        ]
 
     @classmethod
     def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "PowerLaw":

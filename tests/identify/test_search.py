@@ -80,6 +80,14 @@ def test_an_optimum_at_zero_is_reached_and_said(sines):
     assert np.all(np.array([e.standard_error for e in result.parameters]) >= 0.99 * expected)
 
 
+def test_a_side_that_starts_without_force_is_found(sines):
+    """At 0.06 m/s a cubic law has none; its exponent went to 1300, where the law missed "the shape of the curve"."""
+    slow = [(0.002, 0.5), (0.002, 2.0), (0.002, 5.0)]
+    runs = sines(PowerLaw(1800.0, 0.55, 900.0, 0.55), noise=5.0, tests=slow)
+    result = fit(PowerLaw(1e4, 0.2, 100.0, 3.0, 10.0, 10.0), runs, rig="offset")
+    assert result.rmse < 5.2 and abs(result["compression_exponent"].value - 0.55) < 0.1
+
+
 def test_data_that_press_beyond_zero_are_said_to(sines):
     runs = sines(PowerLaw(1800.0, 0.6, 900.0, 1.3), noise=2.0)
     lowered = [
