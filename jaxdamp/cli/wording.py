@@ -36,6 +36,7 @@ CALLS = {
     r'`rig="heat"`': "--rig offset,heat",
     r"or put the law into `Play`": "or fit --law besinger_play",
     r" \(`identify\.design_experiment` proposes tests\)": "",
+    r" \(`jaxdamp\.respond`\)": "",
     r"\bskip_bad=True\b": "--skip-bad",
     r"Look at them with `data\.where[^`]*`, and at `data\.reason`": "sweep.csv has all points with the reasons",
     r"`data\.failed` marks them, and `data\.reason` says why": "sweep.csv has the reasons",
