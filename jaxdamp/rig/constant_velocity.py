@@ -44,6 +44,7 @@ LONGEST_HOLD = 64  # s at constant velocity
 # s and J/K, in which a law neither cools nor warms; finite, so that the levels of a command without a share add nothing
 LONG, HEAVY = 1e15, 1e30
 STEADY = 1e-4  # change of a force while the time held doubles, relative to the scale of the forces: settled
+MOST_SPANS = 2  # of velocities without a force that are named
 NO_CAVITY = -1e30  # Pa, below the pressure of any oil
 STILL = {"float64": 1e-9, "float32": 1e-3}  # the same, at which no longer hold can improve the curve
 
@@ -179,10 +180,18 @@ def _gaps(
     notes = []
     for at, why in reasons:
         if at.any():
-            lower, upper = (f"{end:.3g}" for end in (velocity[at].min(), velocity[at].max()))
-            where = f"at {lower}" if lower == upper else f"from {lower} to {upper}"
-            notes.append(f"No force at {np.count_nonzero(at)} of {at.size} velocities, {where} m/s: {why}")
+            where = f"{np.count_nonzero(at)} of {at.size} velocities, {_spans(velocity, at)} m/s"
+            notes.append(f"No force at {where}: {why}")
     return " ".join(notes)
+
+
+def _spans(velocity: np.ndarray, at: np.ndarray) -> str:
+    """Where points lie, in words: each row of neighbours, or all in one span where there are more than two."""
+    order = np.argsort(velocity)
+    ends = np.flatnonzero(np.diff(at[order], prepend=False, append=False)).reshape(-1, 2) - [0, 1]
+    rows = velocity[order][ends if len(ends) <= MOST_SPANS else ends[[0, -1], [0, 1]][None]]
+    words = ((f"{lower:.3g}", f"{upper:.3g}") for lower, upper in rows)
+    return " and ".join(f"at {lower}" if lower == upper else f"from {lower} to {upper}" for lower, upper in words)
 
 
 def _hold(law: AbstractDamper, stroke: float, velocities: Array, states: Array, count: Array) -> tuple[Array, Array]:

@@ -72,7 +72,7 @@ def test_rows_without_a_force_are_left_out_and_said(tmp_path):
         path = to_csv(law, tmp_path / "fv.csv", [-0.1, -1e-6, 0.0, 1e-6, 0.1])
     comments, _, (v, force) = read(path)
     assert v.tolist() == [-0.1, 0.0, 0.1] and np.isfinite(force).all()
-    assert comments[3].startswith("# rows left out: No force at 2 of 5 velocities, from -1e-06 to 1e-06 m/s")
+    assert comments[3].startswith("# rows left out: No force at 2 of 5 velocities, at -1e-06 and at 1e-06 m/s")
 
 
 def test_a_law_without_any_settled_force_is_refused_in_few_words(tmp_path):

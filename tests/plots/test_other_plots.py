@@ -100,7 +100,7 @@ def test_a_gap_in_a_curve_and_a_remark_stand_under_the_picture() -> None:
     drawn = np.isfinite(_line(figure.axes[0], "dry (settled)")[:, 1])
     assert drawn.tolist() == [True, False, True, False, True]
     said = " ".join(figure.get_supxlabel().split())
-    assert said.startswith("Drawn is one law. dry: No force at 2 of 5 velocities, from -1e-06 to 1e-06 m/s")
+    assert said.startswith("Drawn is one law. dry: No force at 2 of 5 velocities, at -1e-06 and at 1e-06 m/s")
 
 
 def test_no_law_is_refused() -> None:
