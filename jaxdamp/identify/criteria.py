@@ -13,8 +13,9 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, PyTree
 
 from jaxdamp import _checks
+from jaxdamp.identify.losses import LOSSES, robust_of, unit_of
 from jaxdamp.identify.noise import Noise
-from jaxdamp.identify.problem import Problem, Robust
+from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.residuals import AbstractResiduals
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import PROMISING, Solution, distinct_ends
@@ -27,39 +28,7 @@ CONTRADICTED = 5.0  # standard deviations from a prior that it does not allow
 NEXT_TO_NOTHING = 1e-6  # of the noise
 QUIETER = 0.8  # noise of a fit without priors, relative to that with them, below which these are wrong
 FIRST_NOISE = 0.01  # of the RMS force, before a fit says more
-FEWEST = 50  # samples of each record, from which on it has a mean influence of its own
-LEAST_SLOPE = 0.05  # of the influence, relative to the weight: far samples of a redescending loss say nothing
 HALF = 0.5  # weight below which a sample is counted as left out
-
-
-class Loss(NamedTuple):
-    """A loss by its weights; u is the residual in robust standard deviations."""
-
-    weight: Callable[[np.ndarray], np.ndarray]  # ψ(u)/u
-    slope: Callable[[np.ndarray], np.ndarray]  # ψ'(u)
-    value: Callable[[np.ndarray], np.ndarray]  # twice the integral of ψ
-
-
-LOSSES = {
-    "squares": Loss(np.ones_like, np.ones_like, np.square),
-    "huber": Loss(
-        lambda u: np.minimum(1.0, 1.345 / np.maximum(np.abs(u), 1e-9)),
-        lambda u: (np.abs(u) < 1.345).astype(float),
-        lambda u: np.where(np.abs(u) < 1.345, u**2, 1.345 * (2.0 * np.abs(u) - 1.345)),
-    ),
-    "soft_l1": Loss(
-        lambda u: (1.0 + (u / 1.5) ** 2) ** -0.5,
-        lambda u: (1.0 + (u / 1.5) ** 2) ** -1.5,
-        lambda u: 2.0 * 1.5**2 * ((1.0 + (u / 1.5) ** 2) ** 0.5 - 1.0),
-    ),
-    "student_t": Loss(
-        lambda u: 5.0 / (4.0 + u**2),
-        lambda u: 5.0 * (4.0 - u**2) / (4.0 + u**2) ** 2,
-        lambda u: 5.0 * np.log1p(u**2 / 4.0),
-    ),
-}
-"""Huber's loss and the soft absolute value have 95 % of the efficiency of least squares with normal noise, Student's t
-with four degrees of freedom a little less, and it ignores far samples altogether."""
 
 
 @final
@@ -171,8 +140,8 @@ class Round(NamedTuple):
             spread: robust standard deviation of the residual without these weights, if it is known.
         """
         missed, used = residual / self.root, plain.used
-        unit = _unit(missed[used], loss, spread)
-        if not unit > 0:
+        unit = unit_of(missed, plain, loss, spread)
+        if not np.all(unit > 0):
             return None
         relative = missed / unit
         weight = np.where(used, LOSSES[loss].weight(relative), 1.0)
@@ -185,11 +154,6 @@ class Round(NamedTuple):
             )
         )
         return Round(problem, np.sqrt(weight))
-
-
-def _unit(missed: Float[np.ndarray, " samples"], loss: str, spread: float | None) -> float:
-    """The robust standard deviation of a residual, unless it is known."""
-    return 1.0 if loss == "squares" else spread or 1.4826 * float(np.median(np.abs(missed)))
 
 
 def solve_by(
@@ -273,8 +237,9 @@ class _Rounds(NamedTuple):
         """Whether one solution has less of the loss than another, whose robust standard deviation is taken."""
         used = self.problem.used
         missed = [solution.best.residual / now.root for now, solution in (other, than)]
-        unit, value = _unit(missed[1][used], self.loss, self.spread), LOSSES[self.loss].value
-        costs = [unit**2 * value(each[used] / unit).sum() + float(each[~used] @ each[~used]) for each in missed]
+        unit, value = unit_of(missed[1], self.problem, self.loss, self.spread), LOSSES[self.loss].value
+        robust = [unit**2 * value(each / unit) for each in missed]
+        costs = [np.sum(np.where(used, cost, each**2)) for cost, each in zip(robust, missed, strict=True)]
         return bool(costs[0] < costs[1])
 
 
@@ -322,23 +287,6 @@ def against_priors(
                     f"{values[i]:.5g} is {off:.2g} standard deviations away"
                 )
     return said
-
-
-def robust_of(
-    loss: Loss, relative: Float[np.ndarray, " samples"], used: Bool[np.ndarray, " samples"], owner: np.ndarray
-) -> Robust:
-    """How the errors follow from the weighted residuals, by the mean influence in each record if none is short."""
-    groups = [np.flatnonzero(used & (owner == i)) for i in np.unique(owner[used])]
-    each = len(groups) > 1 and min(map(len, groups)) >= FEWEST
-    factor, root = np.ones(relative.size), np.ones(relative.size)
-    for rows in groups if each else [np.flatnonzero(used)]:
-        u = relative[rows]
-        weight = loss.weight(u)
-        slope = max(float(np.mean(loss.slope(u))), LEAST_SLOPE * float(np.mean(weight)))
-        root[rows] = np.sqrt(slope / np.mean(weight))
-        shown = float(np.mean(weight * u * u))
-        factor[rows] = np.sqrt(np.mean((weight * u) ** 2) / slope / shown) if shown > 0 else 1.0
-    return Robust(factor, root, each)
 
 
 def criterion_in_words(problem: Problem, loss: str, priors: Mapping[str, Sequence[float]]) -> str:

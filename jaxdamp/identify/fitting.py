@@ -18,9 +18,10 @@ from jaxdamp._traced import of_known_numbers
 from jaxdamp._triangles import triangle
 from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.identify.contradicting import refuse_several_laws
-from jaxdamp.identify.criteria import LOSSES, criterion_in_words, solve_by
+from jaxdamp.identify.criteria import criterion_in_words, solve_by
 from jaxdamp.identify.judging import MOST_WARNINGS, input_noise_bias, judge, on_bias
 from jaxdamp.identify.law_result import FitResult
+from jaxdamp.identify.losses import LOSSES
 from jaxdamp.identify.machine import Machine, holds_static_force, static_force_in_words, with_static_force_on_machine
 from jaxdamp.identify.many import fit_many
 from jaxdamp.identify.many_result import ManyFits

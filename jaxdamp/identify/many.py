@@ -19,12 +19,13 @@ from jaxdamp.bench import BenchRun
 from jaxdamp.blocks import Cluster
 from jaxdamp.dampers import AbstractDamper, Reach
 from jaxdamp.identify.contradicting import refuse_several_laws
-from jaxdamp.identify.criteria import LOSSES, Priors
+from jaxdamp.identify.criteria import Priors
 from jaxdamp.identify.dependence import OWN, Dependence, Products, dependence
 from jaxdamp.identify.initial_states import INITIAL_STATES
 from jaxdamp.identify.judging import NotFiniteError
 from jaxdamp.identify.lanes import Lanes, by_rounds, judged
 from jaxdamp.identify.law_result import FitResult
+from jaxdamp.identify.losses import LOSSES
 from jaxdamp.identify.machine import Machine
 from jaxdamp.identify.many_blocks import fit_into_store
 from jaxdamp.identify.many_records import (

@@ -18,10 +18,11 @@ from jaxdamp._settings import with_defaults
 from jaxdamp._tables import Column, Contents, Table, plain
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import Reach, without_fitted_ranges
-from jaxdamp.identify.criteria import LOSSES, criterion_in_words, priors_on, solve_by
+from jaxdamp.identify.criteria import criterion_in_words, priors_on, solve_by
 from jaxdamp.identify.estimates import parameter_table
 from jaxdamp.identify.estimating import estimate
 from jaxdamp.identify.judging import MOST_WARNINGS, fields_of_fit, on_status
+from jaxdamp.identify.losses import LOSSES
 from jaxdamp.identify.noise import Noise, independent
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.residuals import AbstractResiduals

@@ -15,9 +15,10 @@ from jaxdamp._one_thread import one_thread
 from jaxdamp._settings import with_defaults
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, RideRecord
-from jaxdamp.identify.criteria import LOSSES, criterion_in_words, priors_on, solve_by
+from jaxdamp.identify.criteria import criterion_in_words, priors_on, solve_by
 from jaxdamp.identify.estimating import estimate
 from jaxdamp.identify.judging import MOST_WARNINGS, fields_of_fit, on_status
+from jaxdamp.identify.losses import LOSSES
 from jaxdamp.identify.machine import Machine, started_machine
 from jaxdamp.identify.model import VehicleTest, own_names, spread, with_means
 from jaxdamp.identify.noise import Noise, channel_noise
