@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float
 
+from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
 from jaxdamp.bench import clock, sign as signs
 from jaxdamp.bench.clock import Part, regular_parts
@@ -171,6 +172,20 @@ def _check_rate(parts: list[Part], rate: float | int | None, where: str) -> None
         )
 
 
+def _check_temperature(temperature: Samples, where: str) -> None:
+    """Refuse temperatures that no damper has: of a sensor that failed, or in another unit."""
+    cold = temperature[temperature <= _checks.COLDEST]
+    if cold.size:
+        without, unit = Setting("columns", {"temperature": None}), Setting("units", {"temperature": "degC"})
+        raise ArgumentError(
+            f"{where}: the temperature is {cold[0]:.6g} K, {cold[0] - 273.15:.6g} °C ({cold.size} values below "
+            f"{_checks.COLDEST:g} K in all). Did the sensor fail? Leave the channel out with {without}. Is its unit "
+            f"another one? Name it with {unit}.",
+            without,
+            unit,
+        )
+
+
 def _record(
     table: RawTable,
     columns: Mapping[str, Column],
@@ -198,6 +213,8 @@ def _record(
         decision = signs.decide(time, stroke, force, how.sign, how.force_sign, where, headers)
     if velocity is None or not (states_all or integrated):
         velocity, source = _velocity(time, stroke, velocity, where)
+    if "temperature" in moved:
+        _check_temperature(moved["temperature"], f"{where}, column {columns['temperature'].header!r}")
     stated = _stated(table) if states_all else {}
     held, varying, unit, said = _commanded(columns, moved, stated.get("command"))
     return BenchRun(

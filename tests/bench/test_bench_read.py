@@ -34,6 +34,20 @@ def test_unused_columns_and_temperature(write):
     assert "not used: cycle" in run.notes[0]
 
 
+def test_a_temperature_that_no_damper_has_is_refused(write):
+    """Of a thermocouple that fell off, and of degrees Celsius that are said to be kelvin."""
+    broken = np.where(np.arange(600) < 590, 40.0, -9999.0)
+    off = write("off.csv", header="t_s,x_mm,F_N,T_degC", extra=[broken])
+    with pytest.raises(ValueError, match=r"'T_degC': the temperature is -9725.85 K, -9999 °C \(10 values below 150 K"):
+        read(off)
+    assert read(off, columns={"temperature": None})[0].temperature is None
+    warm = write("warm.csv", header="t_s,x_mm,F_N,T [K]", extra=[np.full(600, 40.0)])
+    with pytest.raises(ValueError, match=r'Name it with units=."temperature": "degC"'):
+        read(warm)
+    read_warm = read(warm, units={"temperature": "degC"})[0]
+    assert read_warm.temperature is not None and np.allclose(read_warm.temperature, 313.15)
+
+
 def test_compression_positive_files_are_turned(write):
     plain, turned = read(write())[0], read(write("b.csv"), sign="compression-positive")[0]
     for channel in ("stroke", "velocity", "force"):
