@@ -112,7 +112,21 @@ def _values(table: RawTable, raw: RawColumn, column: Column) -> tuple[Samples, s
         clock.check_numbers(values, f"{column.role} (column {column.header!r})", table.where, table.place)
     except ValueError as error:
         raise ArgumentError(f"{error} Or pass {drop}.", drop) from error
+    if column.role == "temperature":
+        _check_temperature(values, where)
     return values, ""
+
+
+def _check_temperature(temperature: Samples, where: str) -> None:
+    """Refuse temperatures that no damper has: of a sensor that failed, or in another unit."""
+    cold = temperature[temperature <= _checks.COLDEST]
+    if cold.size:
+        unit = Setting("units", {"temperature": "degC"})
+        raise ArgumentError(
+            f"{where}: the temperature is {cold[0]:.6g} K, {cold[0] - 273.15:.6g} °C ({cold.size} values below "
+            f"{_checks.COLDEST:g} K in all). Did the sensor fail? Is its unit another one? Name it with {unit}.",
+            unit,
+        )
 
 
 def _columns_note(table: RawTable, columns: Mapping[str, Column]) -> str:
@@ -172,20 +186,6 @@ def _check_rate(parts: list[Part], rate: float | int | None, where: str) -> None
         )
 
 
-def _check_temperature(temperature: Samples, where: str) -> None:
-    """Refuse temperatures that no damper has: of a sensor that failed, or in another unit."""
-    cold = temperature[temperature <= _checks.COLDEST]
-    if cold.size:
-        without, unit = Setting("columns", {"temperature": None}), Setting("units", {"temperature": "degC"})
-        raise ArgumentError(
-            f"{where}: the temperature is {cold[0]:.6g} K, {cold[0] - 273.15:.6g} °C ({cold.size} values below "
-            f"{_checks.COLDEST:g} K in all). Did the sensor fail? Leave the channel out with {without}. Is its unit "
-            f"another one? Name it with {unit}.",
-            without,
-            unit,
-        )
-
-
 def _record(
     table: RawTable,
     columns: Mapping[str, Column],
@@ -213,8 +213,6 @@ def _record(
         decision = signs.decide(time, stroke, force, how.sign, how.force_sign, where, headers)
     if velocity is None or not (states_all or integrated):
         velocity, source = _velocity(time, stroke, velocity, where)
-    if "temperature" in moved:
-        _check_temperature(moved["temperature"], f"{where}, column {columns['temperature'].header!r}")
     stated = _stated(table) if states_all else {}
     held, varying, unit, said = _commanded(columns, moved, stated.get("command"))
     return BenchRun(
