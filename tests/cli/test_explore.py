@@ -27,7 +27,7 @@ def test_a_page_of_a_law_with_a_record(tmp_path: Path, monkeypatch: pytest.Monke
     found = re.search(r'id="data">(.*?)</script>', text, re.DOTALL)
     assert found is not None
     data = json.loads(found[1])
-    assert data["shown"] == {"units": {}, "turned": False}
+    assert data["shown"] == {"units": {"N/m": ["N/mm", 1e-3], "m": ["mm", 1e3]}, "turned": False}
     assert (data["road"]["class"], data["road"]["speed"], data["count"]) == ("D", 15.0, 2001)
     assert [record["name"] for record in data["records"]] == ["run"]
     assert data["baseline"]["numbers"][0]["start"] == [1500.0]
