@@ -49,7 +49,7 @@ def test_runs_from_start_to_end(path, request, monkeypatch):
     assert len(_pictures(notebook.cells)) >= 3
     assert not any("\r" in output.get("text", "") for output in outputs), "a line of progress is stored"
     if path.stem in KEPT and os.environ.get("JAXDAMP_NOTEBOOKS") != "full":
-        if "JAXDAMP_REDRAW" in os.environ:
+        if os.environ.get("JAXDAMP_REDRAW"):
             _keep(notebook, before, path)
         _is_what_is_kept(notebook, nbformat.read(path, as_version=4), path.name)
     EXECUTED.mkdir(parents=True, exist_ok=True)
