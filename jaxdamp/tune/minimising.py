@@ -314,7 +314,7 @@ def _of_one_road(result: TuneResult[V]) -> list[str]:
         or result.verdict.outcome not in (Outcome.NOT_BETTER, Outcome.NOT_SHOWN)
     ):
         return []
-    several = "four together, `Scenarios([road, road.reseeded(1), road.reseeded(2), road.reseeded(3)])`"
+    several = "four together, `Scenarios([road.reseeded(seed) for seed in range(4)])`"
     return [f"One realisation of a road has an optimum of its own. Tune on {several}, or on a longer one."]
 
 
