@@ -48,7 +48,14 @@ class PowerLaw(AbstractMemoryless):
 
     def other_starts(self, reach: Reach) -> list[dict[str, float]]:
         """A straight line with the force of the other side, for a side that has next to none within the records."""
-        rebound, compression = (abs(float(self.force_velocity(v))) for v in (reach.velocity, -reach.velocity))
+        # In plain numbers: the formula as operations of JAX would be thirty programs for two values.
+        rebound, compression = (
+            float(force) * reach.velocity ** float(exponent) + float(offset)
+            for force, exponent, offset in (
+                (self.rebound_force, self.rebound_exponent, self.rebound_offset),
+                (self.compression_force, self.compression_exponent, self.compression_offset),
+            )
+        )
         sides = (("rebound", rebound, compression), ("compression", compression, rebound))
         return [
             {f"{side}_force": other / reach.velocity, f"{side}_exponent": 1.0}
