@@ -28,6 +28,7 @@ from jaxdamp.identify.residual_patterns import (
     LATE,
     MEANINGS,
     OF_LAW,
+    OR_MEMORY,
     Pattern,
     Record,
     column,
@@ -185,7 +186,7 @@ def _search(
     problem: Problem, records: Sequence[Record], residual: np.ndarray, span: np.ndarray, squares: float, least: float
 ) -> list[_Named]:
     """The effects that explain most, one after the other, until one is of the law."""
-    effects = [*proportional(problem, records), *_late(records, residual, span)]
+    effects = [*proportional(problem, records), *_late(problem, records, residual, span)]
     numbers, named = span.shape[1], list[_Named]()
     while len(named) < MOST_EFFECTS:
         late = {
@@ -216,14 +217,14 @@ def _is_static(explained: _Named) -> bool:
     return bool(abs(float(explained.effect.at_rest @ explained.sizes)) > STATIC * size)
 
 
-def _late(records: Sequence[Record], residual: np.ndarray, span: np.ndarray) -> list[Pattern]:
+def _late(problem: Problem, records: Sequence[Record], residual: np.ndarray, span: np.ndarray) -> list[Pattern]:
     """A delay and a low-pass filter of the force, with the size that explains most."""
-    effects = []
+    effects, otherwise = [], OR_MEMORY * is_memoryless(problem.law)
     for name, change in LATE.items():
         size, effect, (words, remedy) = FIRST_SIZE, None, MEANINGS[name]
         for _ in range(REFINED):
             signals = column(records, lambda m, size=size, change=change: change(m, size) / size)
-            effect = Pattern(name, signals, name == "delay", filled(words), remedy)
+            effect = Pattern(name, signals, name == "delay", filled(words), remedy + otherwise)
             explained = _explained(effect, span, residual, 1.0)
             if explained is None:
                 break

@@ -34,12 +34,13 @@ MEANINGS = {  # what an effect is, with its size, and what to do
         "a zero that drifts by {:.3g} N/s",
         "let the bench warm up, and set the load cell to zero before each record",
     ),
-    "delay": ("a delay of the force by {:.2g} s", 'add "delay" to the machine (`rig`), or take a law with hysteresis'),
+    "delay": ("a delay of the force by {:.2g} s", 'add "delay" to the machine (`rig`)'),
     "lag": (
         "a low-pass filter of the force with a time constant of {:.2g} s",
-        'add "lag" to the machine (`rig`), or take a law with hysteresis',
+        'add "lag" to the machine (`rig`)',
     ),
 }
+OR_MEMORY = ", or take a law with hysteresis"  # what else may explain a delay or a filter, to a law without
 
 Values = Float[np.ndarray, " samples"]
 

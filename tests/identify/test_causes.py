@@ -54,6 +54,18 @@ def test_friction_with_a_memory_imitates_no_delay():
     assert "by no delay of a channel" in said and '"delay"' not in said
 
 
+@pytest.mark.parametrize("spring", [None, 4e5], ids=["without memory", "with memory"])
+def test_only_a_law_without_memory_is_told_to_take_one(spring):
+    def law(rebound, compression):
+        curve = dampers.Bilinear(rebound, compression)
+        return curve if spring is None else dampers.SeriesSpring(curve, spring)
+
+    tests = [bench.SineTest(0.02, f) for f in (1.0, 3.0, 8.0)]
+    runs = bench.VirtualDyno(law(2600.0, 1200.0), 500.0, force_noise=5.0, force_delay=2e-3).run(tests)
+    (said,) = (w for w in identify.fit(law(2000.0, 1500.0), runs).warnings if "a delay of the force by" in w)
+    assert 'add "delay" to the machine' in said and ("or take a law with hysteresis" in said) == (spring is None)
+
+
 @pytest.mark.parametrize("number", [0, 2])
 def test_the_gain_of_a_record_is_relative_to_the_force_without_it(number):
     """One of four files in lbf that are said to be N: gains of -0.03 and 0.19 were named."""
