@@ -4,6 +4,7 @@ import csv
 import dataclasses
 import html
 import io
+import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeAlias
@@ -172,6 +173,7 @@ class Table:
     __repr__ = to_text
 
 
+MANY_DIGITS = 1e5  # percent, from which a change has two digits
 _NAMES = ("law", "metric", "parameter", "channel", "what")  # columns with names of the library
 
 
@@ -185,6 +187,18 @@ def _html_cell(text: str, side: str, named: bool, *, words: bool) -> str:
 def percent_change(before: float, after: float) -> float | None:
     """Relative change [%]; none from zero."""
     return 100.0 * (after / before - 1.0) if before else None
+
+
+def percentage(change: float, half_width: float = math.nan) -> str:
+    """A change [%] in words, with half the width of its interval [%] if it has one.
+
+    >>> percentage(-15.61, 0.62), percentage(3.4e9), percentage(-0.01)
+    ('-15.6 ± 0.6 %', '+3.4e+09 %', '0.0 %')
+    """
+    spec = ".1f" if abs(change) < MANY_DIGITS else ".2g"
+    error = f" ± {half_width:{spec}}" if math.isfinite(half_width) else ""
+    text = f"{change:+{spec}}"
+    return f"{text if float(text) else text[1:]}{error} %"  # nothing has no sign
 
 
 class Compared(NamedTuple):

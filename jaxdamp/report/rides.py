@@ -8,7 +8,7 @@ import numpy as np
 from jaxdamp import plots
 from jaxdamp._display import display
 from jaxdamp._settings import with_defaults
-from jaxdamp._tables import Table, percent_change, typeset_unit
+from jaxdamp._tables import Table, percent_change, percentage, typeset_unit
 from jaxdamp._words import path_words
 from jaxdamp.dampers import AbstractDamper, law_name
 from jaxdamp.metrics import comfort_reaction
@@ -103,7 +103,9 @@ def ride_verdict(responses: Mapping[str, Response]) -> list[str]:
     if others:
         return [
             f"{name} against {first}: "
-            + ", ".join(f"{WORDS[g]} {_change(values[first][g], values[name][g]):+.1f} %" for g in goals)
+            + ", ".join(
+                f"{WORDS[g]} {percentage(percent_change(values[first][g], values[name][g]) or 0.0)}" for g in goals
+            )
             + _trust(response)
             for name, response in others
         ]
@@ -115,11 +117,6 @@ def ride_verdict(responses: Mapping[str, Response]) -> list[str]:
     if "comfort" in goals and typeset_unit(units[goals["comfort"][0]]) == "m/s²":
         feel = f" ISO 2631-1 calls such an acceleration {' or '.join(comfort_reaction(values[first]['comfort']))}."
     return [f"{', '.join(said)}{_trust(baseline)}{feel}" if said else ""]
-
-
-def _change(before: float, after: float) -> float:
-    """The change in percent, to a tenth and without a negative zero."""
-    return round(percent_change(before, after) or 0.0, 1) + 0.0
 
 
 def _trust(response: Response) -> str:

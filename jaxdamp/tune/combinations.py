@@ -7,8 +7,8 @@ from typing import final
 import numpy as np
 from jaxtyping import Bool, Float
 
-from jaxdamp._tables import Column, Contents, Table, plain, typeset_unit
-from jaxdamp.tune.limits import amount, percentage
+from jaxdamp._tables import Column, Contents, Table, percentage, plain, typeset_unit
+from jaxdamp.tune.limits import amount
 from jaxdamp.tune.rescoring import Rescore
 from jaxdamp.tune.verdict import relative_change
 

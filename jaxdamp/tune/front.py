@@ -11,11 +11,11 @@ from jaxtyping import Bool, Float
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._status import Status
-from jaxdamp._tables import Column, Contents, Table, plain, typeset_unit, with_unit
+from jaxdamp._tables import Column, Contents, Table, percentage, plain, typeset_unit, with_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import MetricValues
 from jaxdamp.parameters import FreeParameters
-from jaxdamp.tune.limits import amount, percentage
+from jaxdamp.tune.limits import amount
 from jaxdamp.tune.measuring import Measurement
 from jaxdamp.tune.result import V
 from jaxdamp.tune.verdict import relative_change

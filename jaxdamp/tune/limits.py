@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 EXAMPLE = "Write `{'working_space_peak_to_peak': 0.1}`, or `{...: (smallest, largest)}`."
 ENDS = "Write 0.1, or (-0.08, 0.1); None for an end without a limit, '+10%' for one relative to the start."
-MANY_DIGITS = 1e5  # percent, from which a change has two digits
 WITHIN = 0.01  # relative excess over a limit on fresh roads up to which it counts as met
 PERCENT = re.compile(r"([+-]\d+(?:\.\d*)?) *%")
 End: TypeAlias = float | int | str | None  # of a limit: in its unit, or relative to the start; None for none
@@ -82,18 +81,6 @@ def amount(value: float, unit: str, *before: float, link: str = " -> ", digits: 
     shown = Display().read(unit)  # where others are shown, sentences are brought to them as a whole
     numbers = link.join(f"{shown(one):.{digits}g}" for one in (*before, value))
     return f"{numbers} {typeset_unit(shown.unit)}".rstrip()
-
-
-def percentage(change: float, half_width: float = math.nan) -> str:
-    """A change [%] in words, with half the width of its interval [%] if it has one.
-
-    >>> percentage(-15.61, 0.62), percentage(3.4e9), percentage(-0.01)
-    ('-15.6 ± 0.6 %', '+3.4e+09 %', '0.0 %')
-    """
-    spec = ".1f" if abs(change) < MANY_DIGITS else ".2g"
-    error = f" ± {half_width:{spec}}" if math.isfinite(half_width) else ""
-    text = f"{change:+{spec}}"
-    return f"{text if float(text) else text[1:]}{error} %"  # nothing has no sign
 
 
 def in_scenarios(name: str, scenarios: Sequence[str]) -> list[str]:

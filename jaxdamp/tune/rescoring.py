@@ -11,12 +11,12 @@ from jaxtyping import Float
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._settings import with_defaults
-from jaxdamp._tables import Column, Compared, Contents, Table, comparison_table, plain
+from jaxdamp._tables import Column, Compared, Contents, Table, comparison_table, percentage, plain
 from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride, simulate
-from jaxdamp.tune.limits import amount, half_interval, in_scenarios, percentage
+from jaxdamp.tune.limits import amount, half_interval, in_scenarios
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.scenarios import Road, Scenarios, check_roads
 from jaxdamp.tune.settings import RUN, Run

@@ -12,10 +12,20 @@ from jaxdamp import _checks, _tables
 from jaxdamp._display import display
 from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
-from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, typeset_unit, with_unit
+from jaxdamp._tables import (
+    Column,
+    Compared,
+    Table,
+    comparison_table,
+    percent_change,
+    percentage,
+    plain,
+    typeset_unit,
+    with_unit,
+)
 from jaxdamp._types import Figure
 from jaxdamp.tune.combinations import Combinations
-from jaxdamp.tune.limits import LimitRange, amount, percentage, written
+from jaxdamp.tune.limits import LimitRange, amount, written
 from jaxdamp.tune.objective import Objective, Targets
 from jaxdamp.tune.ranges import Change
 from jaxdamp.tune.rescoring import Rescore, Spectrum, spectra

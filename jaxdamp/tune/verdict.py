@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from jaxdamp._status import Status
+from jaxdamp._tables import percentage
 from jaxdamp.metrics import Metric
 from jaxdamp.solve import Evaluation
-from jaxdamp.tune.limits import Limit, LimitRange, amount, excess, in_each, lost_limits, percentage
+from jaxdamp.tune.limits import Limit, LimitRange, amount, excess, in_each, lost_limits
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.ranges import Change, SearchRange
 from jaxdamp.tune.smooth import exact_counterpart

@@ -210,6 +210,8 @@ def test_rides_in_words(rides: dict[str, Response]) -> None:
     assert sentence.startswith("firm against soft: weighted RMS of the body acceleration ")
     assert f"RMS of the dynamic tyre load {100 * (firm / soft - 1):+.1f} %; not certain, as the law is" in sentence
     assert sentence.endswith(" % of the time.") and " times the velocity of its records" in sentence
+    (same,) = ride_verdict({"soft": rides["soft"], "again": rides["soft"]})
+    assert same.count(" 0.0 %") == 3  # nothing has no sign
     (alone,) = ride_verdict({"soft": rides["soft"]})
     assert f"tyre load {soft:.3g} N. ISO 2631-1 calls such an acceleration" in alone
     with shown_in(Display("imperial")):
