@@ -3,6 +3,7 @@
 import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
+from statistics import NormalDist
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -19,6 +20,7 @@ from jaxdamp.identify.many_result import ManyFits
 
 D2 = 1.128379  # mean range of two normal numbers, in standard deviations
 FEWEST, FEW = 8, 25  # dampers of a baseline: without less there are no limits, below the other ones they are doubtful
+CHANCE = 0.01  # that a normal baseline of known limits holds a damper as far out as one that is named
 LARGE = 0.5  # share of the variance that is due to the fits, from which it is said
 CALL = "control_charts(many, baseline=50)"
 
@@ -124,8 +126,21 @@ class ControlCharts(AbstractResult):
             if alike > 2.0 / np.sqrt(count):
                 words = f"{name}: dampers made one after the other are alike (correlation {alike:.2f})"
                 said.append(f"{words}, so that the limits are too narrow and alarms more frequent.")
+            elif outside := self._outside(name):
+                said.append(f"{name}: {outside}")
         missing = int(np.count_nonzero(~np.all(np.isfinite(self.values), axis=1)))
         return (*said, *([f"Dampers without some number, which are not charted there: {missing}."] if missing else []))
+
+    def _outside(self, quantity: str) -> str:
+        """A sentence on dampers of the baseline that lie so far from its mean that they widen the limits, or empty."""
+        scores = self.scores[self.baseline, list(self.quantities).index(quantity)]
+        far = np.flatnonzero(np.abs(scores) > NormalDist().inv_cdf(1.0 - 0.5 * CHANCE / scores.size))  # NaN is not
+        if not far.size:
+            return ""
+        which = ", ".join(f"{self.names[self.baseline[i]]!r} ({scores[i]:+.1f})" for i in far)
+        remedy = "If there is a cause, give a `baseline` of names without them."
+        words = "dampers of the baseline lie far from its mean and widen the limits (standard deviations)"
+        return f"{words}: {which}. {remedy}"
 
     def table(self) -> Table:
         """A row for each damper: its numbers, its signals, and what its fit remarks."""

@@ -114,6 +114,22 @@ def test_an_infinite_number_is_a_missing_one_and_the_baseline_any_whole_number()
     assert not signals(Cusum(), infinite[:80])[65:].any()
 
 
+def test_a_damper_of_the_baseline_that_widens_the_limits_is_named():
+    force = 100.0 + np.random.default_rng(3).standard_normal(60)
+    assert not control_charts({"force": force}, baseline=30).warnings
+    force[3] += 40.0
+    found = control_charts({"force": force, "other": np.flip(force)}, baseline=30)
+    assert found.deviation[0] > 2.0
+    (said,) = found.warnings
+    assert (
+        "force: dampers of the baseline lie far" in said
+        and "deviations): '4' (+" in said
+        and "baseline` of names without" in said
+    )
+    mended = control_charts({"force": force}, baseline=[name for name in NAMES if name != "4"])
+    assert not mended.warnings and mended.deviation[0] == pytest.approx(1.0, rel=0.25)
+
+
 @pytest.mark.parametrize("missing", [25, 29])
 def test_a_shift_lasts_beside_a_damper_without_the_number(missing):
     force = 100.0 + np.random.default_rng(1).standard_normal(30)
