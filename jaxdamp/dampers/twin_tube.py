@@ -82,6 +82,11 @@ class TwinTube(AbstractTube):
         """A_c [m²], of the tube."""
         return self.piston.area + self.gas.rod_area
 
+    @property
+    def base_on_rod(self) -> PistonFlow:
+        """The base valve as a law of the rod: the force A_r Δp_b at the flow A_r v."""
+        return eqx.tree_at(lambda base: base.area, self.base, self.gas.rod_area)
+
     def pressures(self, x: ScalarLike, above: ScalarLike, below: ScalarLike) -> tuple[Scalar, Scalar, Scalar]:
         """p_r, p_c and p_g [Pa, absolute] at stroke x [m] and deflections e and c [m]."""
         _, stiffness = self._stiffnesses(x)
@@ -149,8 +154,7 @@ class TwinTube(AbstractTube):
 
     def incompressible(self) -> AbstractDamper:
         """`piston + base + gas + friction`, the limit B → ∞ without cavities: no states, for sweeps and slow motion."""
-        base = eqx.tree_at(lambda base: base.area, self.base, self.gas.rod_area)  # A_r Δp at the flow A_r v
-        return self.piston + base + self.gas + self.friction
+        return self.piston + self.base_on_rod + self.gas + self.friction
 
     @classmethod
     def guess(

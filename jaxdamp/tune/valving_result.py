@@ -107,12 +107,14 @@ class ValvingResult(AbstractResult):
 
     def _on_cavities(self) -> Iterator[str]:
         """A sentence on each direction in which a cavity opens."""
-        for side, inside in (("rebound", self.velocity > 0.0), ("compression", self.velocity < 0.0)):
+        sides = (("rebound", "an intake", "less"), ("compression", "a base valve", "more"))
+        for (side, valve, resists), inside in zip(sides, (self.velocity > 0.0, self.velocity < 0.0), strict=True):
             if np.any(at := inside & self.cavities):
                 slowest, error = np.abs(self.velocity[at]).min(), np.abs(self.force - self.target_force)[at].max()
+                other = f", or {valve} that resists {resists}" * isinstance(self.law, TwinTube)
                 yield (
-                    f"In {side} a cavity opens from {slowest:.2g} m/s on, with an error of up to {error:.0f} N: start "
-                    "from a higher `gas.pressure` and freeze it, or bound it from below."
+                    f"In {side} a cavity opens from {slowest:.2g} m/s on, with an error of up to {error:.0f} N: allow "
+                    f"a higher `gas.pressure`{other}."
                 )
 
     def table(self) -> Table:

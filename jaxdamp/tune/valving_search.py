@@ -24,7 +24,7 @@ from jaxdamp.dampers import AbstractDamper, MonoTube, TwinTube
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.rig import march, quasi_static, respond
 from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, least_squares_on_host
-from jaxdamp.tune.cavities import with_cavities
+from jaxdamp.tune.cavities import lacking, with_cavities
 from jaxdamp.tune.ranges import INSIDE, Bound, SearchRange, search_range
 from jaxdamp.tune.settings import Free
 from jaxdamp.tune.valving_result import OutOfReach, ValveParameter, ValvingResult
@@ -51,7 +51,8 @@ class ValvingSettings(Free, total=False):
 
 DEFAULTS: ValvingSettings = {"over": None, "freeze": (), "bounds": None, "starts": 8, "max_steps": 200}
 Target: TypeAlias = AbstractDamper | BenchRun | Sequence[BenchRun] | tuple[VectorLike, VectorLike]
-ForceOf = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]  # of values: all forces, and their derivatives
+# Of values: all forces, then those that the pressure lacks to that of a cavity, and their derivatives.
+ForceOf = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 class Loop(NamedTuple):
@@ -108,8 +109,9 @@ def valving(
     If the remaining error is above the tolerance, the result says in which range of velocity, by how much, and which
     bound prevents more.
 
-    Curves are compared without cavities, which have no slope that leads out of them; the error that is stated is that
-    with cavities that have just opened, the largest one, and a sentence says where one opens.
+    Curves are compared without cavities, which have no slope that leads out of them; what the pressure of the oil lacks
+    to that of a cavity counts as an error, as a force on the area of the chamber. The error that is stated is that with
+    cavities that have just opened, the largest one, and a sentence says where one opens.
 
     The force has kinks where valves open, and rises within a sample or two where a cavity closes, so the sum of squares
     has narrow local minima. Where a search ends, each parameter is therefore changed by 1 and 10 %, up and down, and
@@ -155,10 +157,10 @@ def valving(
     cavity = (1.0 + INSIDE) * float(start.cavitation_pressure)
     space = dataclasses.replace(space, lower=np.where(charge, np.maximum(space.lower, cavity), space.lower))
     force_of = _forces(space.free, wanted, substeps)
-    best = _best(space, force_of, wanted.all_forces, starts, max_steps, CLOSE_ENOUGH * tolerance)
+    best = _best(space, force_of, wanted, starts, max_steps, CLOSE_ENOUGH * tolerance)
     if best is None:
         _checks.refuse("start", "give a finite force", start, "Widen its valves, or shorten the motion.")
-    compared, slopes = force_of(best.values)
+    compared, slopes = (values[: wanted.all_forces.size] for values in force_of(best.values))
     law = space.free.build(jnp.asarray(best.values, space.free.values.dtype))
     reached, cavities = with_cavities(law, wanted.velocity, compared, CAVITY * tolerance * size)
     error = reached - wanted.all_forces
@@ -188,17 +190,18 @@ def valving(
 
 
 def _best(
-    space: SearchRange, force_of: ForceOf, wanted: np.ndarray, starts: int, max_steps: int, close: float
+    space: SearchRange, force_of: ForceOf, wanted: Wanted, starts: int, max_steps: int, close: float
 ) -> _End | None:
     """The best end of searches from several starts, until an error relative to the wanted force is close enough."""
     best: _End | None = None
+    forces = np.pad(wanted.all_forces, (0, lacking(space.free.tree, wanted.velocity).size))  # and no lack of pressure
     with Progress("Choosing the valving") as line:
         for number, begin in enumerate(_starts(space, starts)):
             line(f"start {number + 1} of {starts}")
-            end = _search(space, force_of, wanted, begin, max_steps)
+            end = _search(space, force_of, forces, begin, max_steps)
             if np.isfinite(end.squares) and (best is None or end.squares < best.squares):
                 best = end
-            if best is not None and best.squares < close**2 * np.sum(wanted**2):
+            if best is not None and best.squares < close**2 * np.sum(forces**2):
                 break
     return best
 
@@ -253,7 +256,7 @@ def _loop(target: AbstractDamper, start: MonoTube | TwinTube, frequency: float, 
 
 
 def _forces(free: FreeParameters, wanted: Wanted, substeps: int) -> ForceOf:
-    """Every force of the damper as a function of the values of its free parameters, with derivatives."""
+    """Every row of a search as a function of the values of the free parameters, with derivatives."""
 
     def marched(law: MonoTube | TwinTube, loop: Loop) -> Array:
         dt, stroke, velocity = (jnp.asarray(values) for values in (loop.dt, loop.stroke, loop.velocity))
@@ -263,9 +266,9 @@ def _forces(free: FreeParameters, wanted: Wanted, substeps: int) -> ForceOf:
     def forces(free: FreeParameters, values: Array) -> tuple[Array, Array]:
         def one(values: Array) -> Array:
             law = free.build(values)
-            still = law.incompressible()
-            curve = jax.vmap(lambda v: still.force(0.0, v, still.initial_state()))(jnp.asarray(wanted.velocity))
-            return jnp.concatenate([curve, *(marched(law, loop) for loop in wanted.loops)])
+            still, velocity = law.incompressible(), jnp.asarray(wanted.velocity)
+            curve = jax.vmap(lambda v: still.force(0.0, v, still.initial_state()))(velocity)
+            return jnp.concatenate([curve, *(marched(law, loop) for loop in wanted.loops), lacking(law, velocity)])
 
         return with_jacobian(one)(values)
 
