@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from jaxdamp._types import Scalar, VectorLike
+from jaxdamp._types import VectorLike
 from jaxdamp.dampers import MonoTube, TwinTube
 from jaxdamp.parameters import with_values
 from jaxdamp.rig import quasi_static
@@ -65,7 +65,7 @@ def _opened(law: MonoTube | TwinTube, velocities: Array) -> Array:
     def force(v: Array) -> Array:
         zero = jnp.zeros_like(v)
 
-        def step(_: Scalar, state: Array) -> Array:
+        def step(_: Array, state: Array) -> Array:
             return still.implicit_stage(zero, v, state, STEP)
 
         return still.force(zero, v, jax.lax.fori_loop(0, STEPS, step, still.initial_state()))
