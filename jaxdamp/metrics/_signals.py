@@ -20,6 +20,8 @@ def as_signal(argument: str, signal: SignalLike, *, least: int = 1) -> Signal:
     array = jnp.asarray(signal)
     if not jnp.issubdtype(array.dtype, jnp.inexact):
         array = array.astype(float)
+    if jnp.issubdtype(array.dtype, jnp.complexfloating):
+        _checks.refuse(argument, "be real", f"of type {array.dtype}", "Pass its real part, or its magnitude.")
     if array.ndim != 1:
         remedy = "Pass one channel at a time, or batch with jax.vmap."
         _checks.refuse(argument, "have one axis, time", f"of shape {array.shape}", remedy)
@@ -44,7 +46,10 @@ def same_length(first: str, one: Signal, second: str, other: Signal) -> None:
 
 
 def check_interval(dt: ScalarLike | int) -> None:
-    """Refuse a sampling interval that is not positive and finite."""
+    """Refuse a sampling interval that is not one number, positive and finite."""
+    if np.ndim(dt):
+        remedy = "Samples must be evenly spaced: resample the record, and give their distance in s."
+        _checks.refuse("dt", "be one number", f"of shape {np.shape(dt)}", remedy)
     _checks.positive("dt", dt, "It is the sampling interval in s.")
 
 

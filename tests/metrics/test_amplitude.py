@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import beta
 
-from jaxdamp.metrics import crest_factor, peak, rms, smooth_peak
+from jaxdamp.metrics import crest_factor, peak, rms, settling_time, smooth_peak, vibration_dose_value
 
 
 CYCLE = np.sin(2 * np.pi * np.arange(128) / 128)
@@ -74,3 +74,12 @@ def test_smooth_peak_gradient_is_shared_by_all_large_samples():
 def test_smooth_peak_errors(order, message):
     with pytest.raises(ValueError, match=rf"`order` must {message}"):
         smooth_peak(CYCLE, order)
+
+
+def test_instants_in_place_of_the_interval_and_complex_signals_are_refused(unchecked):
+    signal = np.sin(np.arange(200.0))
+    for metric in (lambda dt: vibration_dose_value(signal, dt, None), lambda dt: settling_time(signal, dt)):
+        with pytest.raises(ValueError, match=r"`dt` must be one number, but is of shape \(200,\).*evenly spaced"):
+            metric(np.full(200, 0.01))
+    with pytest.raises(ValueError, match="`signal` must be real, but is of type complex"):
+        rms(1j * signal)
