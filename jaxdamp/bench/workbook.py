@@ -79,8 +79,7 @@ def _sheet(file: Path, name: str, rows: Rows) -> list[RawTable]:
     header = None if layout is None or len(layout.full) < 2 else header_of(rows, layout)
     if layout is None or header is None:
         return []
-    head = rows[header.top][1]
-    like = [number for number, (_, row) in enumerate(rows, 1) if row == head]
+    like = [number for number, (_, row) in enumerate(rows, 1) if row == rows[header.top][1]]
     blocks = blocks_of(lambda number: rows[number - 1][1], len(rows), header.top + 1, header.first + 1, like, layout)
     return named_apart([_block(file, rows, block, layout, header) for block in blocks], name)
 

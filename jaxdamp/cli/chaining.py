@@ -178,7 +178,10 @@ def run_demo(screen: Screen, scenario: Scenario, output: Output) -> None:
         truth = next((rung.result for rung in fits.comparison.rungs if rung.name == scenario.true_name), None)
         with work.saving("Laws and tables", f"the rides, the tuning, {fits.missing}") as draft:
             write_fits(draft, fits.comparison, runs, work.attempts)
-            _write_truth(draft, truth, scenario, work.attempts)
+            with work.attempts.part("true_law.json"):
+                export.to_json(scenario.law, draft / "true_law.json")
+            if truth is not None:
+                write_tables(draft / "tables", {"parameters_and_truth": truth_table(scenario, truth)})
         preflight, remarks = bench.preflight(runs), _remarks(scenario, fits)
         part = FitPart(fits.comparison, tuple(runs), sheets=False, preflight=preflight, remarks=remarks)
         laws = part.begun(Attempts(message=message))
@@ -306,10 +309,3 @@ def truth_verdict(scenario: Scenario, result: FitResult | None) -> str:
     undetermined = len(rows) - len(determined)
     blind = f" {undetermined} more cannot be told from these records, and the fit says so." if undetermined else ""
     return f"{len(off)} parameters are determined; they are at most {max(off):.1f} standard errors off.{blind}"
-
-
-def _write_truth(folder: Path, truth: FitResult | None, scenario: Scenario, attempts: Attempts) -> None:
-    with attempts.part("true_law.json"):
-        export.to_json(scenario.law, folder / "true_law.json")
-    if truth is not None:
-        write_tables(folder / "tables", {"parameters_and_truth": truth_table(scenario, truth)})

@@ -12,7 +12,7 @@ import socket
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 
 
 SIGNALS = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}  # and what Python does with them
@@ -90,11 +90,9 @@ def closing(tidy: Callable[[], str]) -> Iterator[None]:
         _watch.closing.remove(tidy)
 
 
-@contextmanager
-def undisturbed() -> Iterator[None]:
+def undisturbed() -> AbstractContextManager[object]:
     """Files are moved into place here: a sudden end of the process waits."""
-    with _watch.busy:
-        yield
+    return _watch.busy
 
 
 @contextmanager

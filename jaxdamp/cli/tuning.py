@@ -117,7 +117,11 @@ def tune_command(
     damper = given_law(law)
     car = parse_vehicle(vehicle)(damper)
     reference = None if baseline is None else read_baseline(baseline, car)
-    surfaces, run = _realisations(road, driving, roads)
+    if roads < 1:
+        _checks.refuse("roads", "be 1 or more", roads)
+    if roads > 1 and not road.startswith("iso:"):
+        _checks.refuse("roads", "be 1 for a road that is not random", roads, "Take iso:CLASS.")
+    surfaces, run = driving.over(road, roads)
     car = controlling.of(car, damper)
     if controlling.controller is not None:
         search = replace(search, given={"over": ["policy.**"], **search.given})
@@ -139,15 +143,6 @@ def _settings(car: AbstractVehicle) -> dict[str, tune.Choice]:
     """The settings of laws of several, such as the clicks of a sheet, by the name of the command."""
     laws = ((path, law) for path, law in modules_inside(car) if isinstance(law, Scheduled))
     return {f"{path}command": tune.Choice(np.asarray(law.levels)) for path, law in laws}
-
-
-def _realisations(road: str, driving: Driving, count: int) -> tuple[list[AbstractRoad] | list[WhiteRoad], Run]:
-    """The roads to tune on, and the options of a run over them."""
-    if count < 1:
-        _checks.refuse("roads", "be 1 or more", count)
-    if count > 1 and not road.startswith("iso:"):
-        _checks.refuse("roads", "be 1 for a road that is not random", count, "Take iso:CLASS.")
-    return driving.over(road, count)
 
 
 def tuning_arguments(
@@ -299,8 +294,7 @@ def _present(car: AbstractVehicle, over: Mapping[str, np.ndarray]) -> dict[str, 
 def _limits_by_metric(limit: Mapping[str, Limit], car: AbstractVehicle, *, white: bool) -> dict[str, Limit]:
     """The limits by the ride metrics that their words mean."""
     given = {word: span for word, span in limit.items() if span is not None}
-    spelled = goal_limits(given, car, white=white, argument="limit")
-    return cast(dict[str, Limit], spelled)
+    return cast(dict[str, Limit], goal_limits(given, car, white=white, argument="limit"))
 
 
 def _metrics_of(option: str, word: str, car: AbstractVehicle, *, white: bool) -> list[str]:

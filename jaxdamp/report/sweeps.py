@@ -2,7 +2,6 @@
 
 import functools
 from collections.abc import Hashable, Mapping, Sequence
-from itertools import starmap
 from typing import Unpack
 
 import numpy as np
@@ -79,8 +78,8 @@ def points_table(data: Dataset, limits: Limits | None = None) -> Table:
         return table
     words = np.where(data["failed"], "", np.where(_within(data, spans), "met", "not met")).ravel()
     rows = tuple((*row, word) for row, word in zip(table.rows, words.tolist(), strict=True))
-    title = f"{table.title}; limits: {', '.join(starmap(functools.partial(_limit_in_words, data), spans.items()))}"
-    return Table(title, (*table.columns, Column("limits")), rows)
+    bounds = ", ".join(_limit_in_words(data, name, span) for name, span in spans.items())
+    return Table(f"{table.title}; limits: {bounds}", (*table.columns, Column("limits")), rows)
 
 
 def _limit_in_words(data: Dataset, name: str, span: tuple[float, float]) -> str:
