@@ -99,7 +99,7 @@ def on_identifiability(
             notes.append(f"{e.name} = {e.value:.4g}{unit} is at a bound: the best value is beyond it.")
         reason = ""
         if e.note == "not identifiable":
-            others = [estimates[j].name for members, _ in groups if i in members for j in sorted(members - {i})]
+            others = [estimates[j].name for members, *_ in groups if i in members for j in sorted(members - {i})]
             reason = _reason(effect, others)
             remedy = (effect and effect.remedy) or "Freeze it or add records that excite it."
             remedy = "It keeps the value that is expected from the motion." if e.name.startswith(STARTS) else remedy
@@ -121,10 +121,10 @@ def _reason(effect: Effect | None, others: Sequence[str]) -> str:
 
 def _groups(
     estimates: Sequence[Estimate], directions: Sequence[Float[np.ndarray, " free"]]
-) -> list[tuple[set[int], str]]:
-    """Groups of parameters of which the records determine only a combination, and what hardly changes the force."""
+) -> list[tuple[set[int], str, int]]:
+    """Groups of parameters of which the records leave directions open: what hardly changes the force, and how many."""
     weak = np.array([e.note == "not identifiable" for e in estimates])
-    groups: list[tuple[set[int], str]] = []
+    groups: list[tuple[set[int], str, int]] = []
     for direction in directions:
         signs = np.sign(direction) * weak
         members = set(map(int, np.flatnonzero(signs)))
@@ -134,11 +134,12 @@ def _groups(
         how = " while ".join(f"{way} {_listed([estimates[int(i)].name for i in who])}" for way, who in ways if who.size)
         joined = [group for group in groups if group[0] & members]
         groups = [group for group in groups if not group[0] & members]
-        groups.append((members.union(*(group[0] for group in joined)), "" if joined else how))
+        count = 1 + sum(group[2] for group in joined)
+        groups.append((members.union(*(group[0] for group in joined)), "" if joined else how, count))
     return groups
 
 
-def _together(problem: Problem, estimates: Sequence[Estimate], members: set[int], how: str) -> str:
+def _together(problem: Problem, estimates: Sequence[Estimate], members: set[int], how: str, count: int) -> str:
     """A sentence on parameters that only tests of another kind tell apart, and what kind."""
     on_bench = bool(problem.runs) and all(isinstance(run, BenchRun) for run in problem.runs)
     runs = problem.fitted_to if on_bench else []
@@ -152,7 +153,7 @@ def _together(problem: Problem, estimates: Sequence[Estimate], members: set[int]
     return (
         f"These records cannot distinguish {_listed([estimates[i].name for i in sorted(members)])}"
         + f": {how} hardly changes the force" * bool(how)
-        + f". Freeze all but one of them, or add {tests}."
+        + f". Freeze {'one' if count == 1 else count} of them, or add {tests}."
     )
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from jaxdamp.bench import SineTest, VirtualDyno, programmes
-from jaxdamp.dampers import Besinger, Bilinear, BoucWen, Lag, Linear, PiecewiseLinear
+from jaxdamp.dampers import Besinger, Bilinear, BoucWen, Lag, Linear, MotionRatio, PiecewiseLinear
 from jaxdamp.dampers.base import Reach
 from jaxdamp.dampers.inside import margins
 from jaxdamp.export import from_json, to_json
@@ -138,3 +138,11 @@ def test_starts_that_break_a_condition_are_left_out():
     starts = other_starts(free_parameters(law), REACH)
     assert 0 < len(starts) < len(law.other_starts(REACH))
     assert all(np.all(np.asarray(margins(free_parameters(law).build(jnp.asarray(values)))) > 0) for values in starts)
+
+
+def test_one_number_is_to_be_frozen_where_one_direction_is_open():
+    law = MotionRatio(Bilinear(2600.0, 1200.0), 0.7)
+    runs = VirtualDyno(law, sampling_rate=200.0, force_noise=5.0).run(SineTest(0.02, 2.0, cycles=2))
+    (said,) = (w for w in fit(law, runs).warnings if w.startswith("These records cannot distinguish"))
+    assert "law.compression_rate and ratio: " in said and ". Freeze one of them, or add" in said
+    assert all(e.note == "" for e in fit(law, runs, freeze=["ratio"]).parameters)
