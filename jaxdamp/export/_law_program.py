@@ -66,12 +66,6 @@ def law_numbers(law: eqx.Module) -> list[LawNumber]:
     return numbers
 
 
-def _conditions(model: eqx.Module) -> list[tuple[str, AbstractDamper, Any]]:
-    """Every condition between parameters, with the law that it is about and its path."""
-    inside = ((path, law) for path, law in laws_inside(model) if law.has_conditions())
-    return [(path, law, c) for path, law in inside for c in law.conditions()]
-
-
 def identifier(path: str) -> str:
     """A path, a class or the name of a file as an identifier; letters lose their accents, Greek ones are spelled.
 
@@ -128,15 +122,20 @@ class AbstractProgram:
 
         def margins(values: list[Array]) -> list[Array]:
             model = self.model_of(values)
-            return [jnp.min(getattr(owner, c.parameter) - c.least) for _, owner, c in _conditions(model)]
+            return [jnp.min(getattr(owner, c.parameter) - c.least) for _, owner, c in self._conditions(model)]
 
         return lower(margins, self.values())
 
     @property
     def conditions(self) -> list[str]:
         """The conditions between parameters in words."""
-        each = _conditions(self._model)
+        each = self._conditions(self._model)
         return [f"{path}{c.parameter} must be greater than {c.formula}. {c.reason}" for path, _, c in each]
+
+    def _conditions(self, model: eqx.Module) -> list[tuple[str, AbstractDamper, Any]]:
+        """Every condition between parameters, with the law that it is about and its path."""
+        inside = ((path, law) for path, law in laws_inside(model) if law.has_conditions())
+        return [(path, law, c) for path, law in inside for c in law.conditions()]
 
     def _symbols(self, name: str) -> Symbols:
         return symbols(name, (), self.dtype)

@@ -2,6 +2,7 @@
 
 import dataclasses
 from functools import cached_property
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -130,6 +131,10 @@ class RideProgram(VehicleProgram):
     def values(self, owner: str = "p") -> PyTree[Symbols]:
         """The numbers of the law, and those of the vehicle."""
         return self.law.values(owner), [symbols(f"q{self.member}{n.name}", n.value.shape) for n in self.numbers]
+
+    def _conditions(self, model: eqx.Module) -> list[tuple[str, AbstractDamper, Any]]:
+        """Those of the other laws of the vehicle: the law has its own."""
+        return [one for one in super()._conditions(model) if not one[0].startswith(tuple(self._places))]
 
     @property
     def _observed_so_far(self) -> list[Symbols]:

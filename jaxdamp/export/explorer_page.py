@@ -55,6 +55,7 @@ def vehicle_functions(vehicle: RideProgram) -> dict[str, str]:
         "observe": _filled("observe(m, c, g, h, r)", vehicle.observe, "g"),
         "end": _filled("end(m, g, y)", vehicle.end, "y"),
         "moving": _filled("moving(m, c, h, r, y)", vehicle.moving, "y"),
+        "others": _filled("others(p, q, y)", vehicle.margins, "y"),
     }
 
 
@@ -212,6 +213,7 @@ def _of_car(car: RideProgram) -> Contents:
         "numbers": [_of_number(number) for number in car.numbers],
         "fixed": [in_words(number.path) for number in car.numbers if number.kind == "fixed"],
         "behind": [float(wheel.behind) for wheel in vehicle.frame().wheels],
+        "conditions": car.conditions,
     }
     return {
         "vehicle": about,

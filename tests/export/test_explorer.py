@@ -28,7 +28,7 @@ from jaxdamp.export._law_program import LawProgram
 from jaxdamp.export._ride_program import RideProgram
 from jaxdamp.export.explorer_page import _of_car
 from jaxdamp.metrics import power_spectral_density
-from jaxdamp.parameters import parameter, replace
+from jaxdamp.parameters import parameter, replace, with_values
 from jaxdamp.roads import cosine_bump, from_profile, iso8608
 from jaxdamp.vehicles import presets
 from jaxdamp.vehicles.channels import OF_LINK
@@ -124,6 +124,16 @@ def test_a_moved_slider_is_followed_by_the_numbers_of_the_library(tmp_path, brow
     browser.click("#reset")
     assert cells(browser) == before and number(browser, "sprung_mass") == 1200.0
     assert browser.evaluate("document.getElementById('lawError').textContent") == ""
+    assert not browser.troubles()
+
+
+def test_the_other_laws_of_the_vehicle_keep_their_conditions(tmp_path, browser):
+    law = Linear(1500.0)
+    page(law, tmp_path, browser, vehicle=with_values(presets.half_car_002(law), {"rear.damper": VALVE}), duration=0.5)
+    text = "document.getElementById('lawError').textContent"
+    assert browser.evaluate(text) == ""
+    browser.type('[data-path="rear.damper.compression_rate"]', "10")
+    assert browser.evaluate(text).startswith("rear.damper.compression_rate must be greater than")
     assert not browser.troubles()
 
 

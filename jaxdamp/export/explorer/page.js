@@ -39,6 +39,10 @@ function lawNumbers(side) {
   return numbersOf(DATA.baseline.numbers, start(DATA.baseline.numbers));
 }
 
+function vehicleNumbers() {
+  return numbersOf(DATA.vehicle.numbers, values.vehicle);
+}
+
 // Roads -----------------------------------------------------------------------------------------------------------
 
 // The heights under each wheel.
@@ -78,8 +82,8 @@ function chooseRoad() {
 // Runs ------------------------------------------------------------------------------------------------------------
 
 function drive(side, substeps) {
-  const { program, sizes } = sides[side], q = numbersOf(DATA.vehicle.numbers, values.vehicle);
-  return ride(program, sizes, lawNumbers(side), q, state.road, DATA.dt, substeps, DATA.channels, EVERY);
+  const { program, sizes } = sides[side];
+  return ride(program, sizes, lawNumbers(side), vehicleNumbers(), state.road, DATA.dt, substeps, DATA.channels, EVERY);
 }
 
 function refreshRide() {
@@ -121,9 +125,11 @@ function checkStep() {
 function refresh() {
   const begin = performance.now();
   attempt("lawError", () => {
-    const margins = [];
-    LAW.margins(lawNumbers("law"), margins);
-    const broken = DATA.law.conditions.filter((_, k) => !(margins[k] > 0));
+    const margins = [], others = [], p = lawNumbers("law");
+    LAW.margins(p, margins);
+    LAW.others(p, vehicleNumbers(), others);  // of the other laws of the vehicle
+    const conditions = [...DATA.law.conditions, ...DATA.vehicle.conditions];
+    const broken = conditions.filter((_, k) => !([...margins, ...others][k] > 0));
     if (broken.length) throw new Error(broken.join(" "));
   });
   attempt("loopError", showLoops);
