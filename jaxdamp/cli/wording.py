@@ -46,7 +46,7 @@ CALLS = {
     r"`read_rides\(\.\.\., reversed_channels=\[[^`]*`": "--reversed",
     r"State it as held, `run\.held_at\(([^`]*)\)`": r"State it as held, --command NAME=\1",
     r"Record the command as a channel, `BenchRun\.command_channel`": "Record the command, --columns command=...",
-    r"Freeze (one|\d+) of them, or add": r"Hold \1 of them with --freeze, or add",
+    r"Freeze (\S+) of them, or add": r"Hold \1 of them with --freeze, or add",
     r"Freeze it or add records that excite it": "Hold it with --freeze, or add records that excite it",
     r"Add records beyond it, or freeze it": "Add records beyond it, or hold it with --freeze",
     r"such as knots, or take a law with fewer": "such as --freeze knots, or fit a simpler law",

@@ -24,7 +24,7 @@ from jaxdamp.dampers.command import (
     takes_command as takes_command,
     with_command,
 )
-from jaxdamp.dampers.contract import Reach as Reach, Traits, from_samples as from_samples
+from jaxdamp.dampers.contract import Condition as Condition, Reach as Reach, Traits, from_samples as from_samples
 from jaxdamp.dampers.coulomb_friction import CoulombFriction
 from jaxdamp.dampers.creeping_visco_plastic import CreepingViscoPlastic
 from jaxdamp.dampers.dahl import Dahl

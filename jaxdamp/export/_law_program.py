@@ -15,7 +15,7 @@ from jaxtyping import Array, PyTree
 
 from jaxdamp import _checks
 from jaxdamp.codegen import Program, Symbols, lower, symbols
-from jaxdamp.dampers import AbstractDamper, laws_inside
+from jaxdamp.dampers import AbstractDamper, Condition, laws_inside
 from jaxdamp.parameters import Domain, domain_of, modules_inside, with_values
 
 
@@ -132,7 +132,7 @@ class AbstractProgram:
         each = self._conditions(self._model)
         return [f"{path}{c.parameter} must be greater than {c.formula}. {c.reason}" for path, _, c in each]
 
-    def _conditions(self, model: eqx.Module) -> list[tuple[str, AbstractDamper, Any]]:
+    def _conditions(self, model: eqx.Module) -> list[tuple[str, AbstractDamper, Condition]]:
         """Every condition between parameters, with the law that it is about and its path."""
         inside = ((path, law) for path, law in laws_inside(model) if law.has_conditions())
         return [(path, law, c) for path, law in inside for c in law.conditions()]

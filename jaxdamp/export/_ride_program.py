@@ -2,7 +2,6 @@
 
 import dataclasses
 from functools import cached_property
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -13,7 +12,7 @@ from jaxtyping import Array, PyTree
 from jaxdamp import _checks
 from jaxdamp._traced import equal
 from jaxdamp.codegen import Program, Symbols, symbols
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers import AbstractDamper, Condition
 from jaxdamp.export._law_program import LawNumber, LawProgram
 from jaxdamp.export._vehicle_program import FlatTree, Numbers, VehicleProgram, road_input
 from jaxdamp.parameters import get, modules_inside, with_values
@@ -132,7 +131,7 @@ class RideProgram(VehicleProgram):
         """The numbers of the law, and those of the vehicle."""
         return self.law.values(owner), [symbols(f"q{self.member}{n.name}", n.value.shape) for n in self.numbers]
 
-    def _conditions(self, model: eqx.Module) -> list[tuple[str, AbstractDamper, Any]]:
+    def _conditions(self, model: eqx.Module) -> list[tuple[str, AbstractDamper, Condition]]:
         """Those of the other laws of the vehicle: the law has its own."""
         return [one for one in super()._conditions(model) if not one[0].startswith(tuple(self._places))]
 

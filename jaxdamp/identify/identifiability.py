@@ -23,6 +23,7 @@ FAST, SLOW = 0.8, 0.25  # of the largest velocity: above, or below, which an eff
 SPREAD = 0.8  # share of the velocities of the records that counts as all of them
 ALIKE = 0.98  # correlation of two numbers, from which the records hardly tell them apart
 SAME = 0.1  # relative difference below which frequencies or amplitudes of records count as one
+MOST_NAMED = 6  # numbers in a sentence
 NEEDLESS = "the curve hardly bends there", "Take one with fewer knots."
 
 
@@ -158,7 +159,15 @@ def _together(problem: Problem, estimates: Sequence[Estimate], members: set[int]
 
 
 def _listed(names: Sequence[str], word: str = "and") -> str:
-    return f" {word} ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+    """Names in words, the first ones of many, such as the weights of a network.
+
+    >>> _listed("abc"), _listed("abcdefghij", "or")
+    ('a, b and c', 'a, b, c, d, e, f or 4 more')
+    """
+    first, last = names[:-1], names[-1]
+    if len(names) > MOST_NAMED:
+        first, last = names[:MOST_NAMED], f"{len(names) - MOST_NAMED} more"
+    return f" {word} ".join(filter(None, [", ".join(first), last]))
 
 
 def gas_in_words(
