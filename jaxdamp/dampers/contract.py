@@ -117,12 +117,19 @@ def starts_of_bends(law: PyTree, reach: Reach) -> list[dict[str, float]]:
 
 
 class Condition(NamedTuple):
-    """A lower limit of one parameter of a law that depends on its other parameters."""
+    """A lower limit of one parameter of a law that depends on its other parameters.
+
+    Attributes:
+        parameter: its name.
+        least: the limit, in the unit of the parameter.
+        formula: the limit in words.
+        reason: the consequence of a lower value, a sentence.
+    """
 
     parameter: str
-    least: ScalarLike  # in the unit of the parameter
-    formula: str  # the limit in words
-    reason: str  # the consequence of a lower value, a sentence
+    least: ScalarLike
+    formula: str
+    reason: str
 
 
 def check_conditions(law: PyTree) -> None:
