@@ -112,10 +112,11 @@ class ValvingResult(AbstractResult):
             if np.any(at := inside & self.cavities):
                 slowest, error = np.abs(self.velocity[at]).min(), np.abs(self.force - self.target_force)[at].max()
                 other = f", or {valve} that resists {resists}" * isinstance(self.law, TwinTube)
-                yield (
-                    f"In {side} a cavity opens from {slowest:.2g} m/s on, with an error of up to {error:.0f} N: allow "
-                    f"a higher `gas.pressure`{other}."
-                )
+                remedy = f"allow a higher `gas.pressure`{other}"
+                if any(p.name == "gas.pressure" and "upper" not in p.note for p in self.parameters):
+                    remedy = "a higher `gas.pressure`, which was allowed, suits the rest of the wanted force less"
+                opens = f"In {side} a cavity opens from {slowest:.2g} m/s on, with an error of up to {error:.0f} N"
+                yield f"{opens}: {remedy}."
 
     def table(self) -> Table:
         """The chosen numbers with start, bounds and meaning."""

@@ -194,7 +194,7 @@ def _best(
 ) -> _End | None:
     """The best end of searches from several starts, until an error relative to the wanted force is close enough."""
     best: _End | None = None
-    forces = np.pad(wanted.all_forces, (0, lacking(space.free.tree, wanted.velocity).size))  # and no lack of pressure
+    forces = np.pad(wanted.all_forces, (0, 2 * wanted.velocity.size))  # and no lack of pressure
     with Progress("Choosing the valving") as line:
         for number, begin in enumerate(_starts(space, starts)):
             line(f"start {number + 1} of {starts}")
