@@ -60,7 +60,7 @@ class PowerLaw(AbstractMemoryless):
         return [
             {f"{side}_force": other / reach.velocity, f"{side}_exponent": 1.0}
             for side, force, other in sides
-            if force < NEXT_TO_NONE * other
+            if reach.velocity > 0.0 and force < NEXT_TO_NONE * other
         ]
 
     @classmethod

@@ -3,6 +3,7 @@ import pytest
 from scipy.special import gamma
 
 from jaxdamp.dampers import PowerLaw
+from jaxdamp.dampers.base import Reach
 
 from .motions import last_cycle, work
 
@@ -49,3 +50,10 @@ def test_guess_finds_a_power_law():
     law = PowerLaw.guess(v, force)
     found = [law.rebound_force, law.rebound_exponent, law.compression_force, law.compression_exponent]
     np.testing.assert_allclose(found, [1800.0, 0.55, 900.0, 0.8], rtol=1e-6)
+
+
+def test_a_side_without_force_starts_from_a_straight_line_where_there_is_motion():
+    law = PowerLaw(1e-3, 1.5, 900.0, 0.6, 0.0, 10.0)
+    (start,) = law.other_starts(Reach(0.02, 0.5))
+    assert start == pytest.approx({"rebound_force": (900.0 * 0.5**0.6 + 10.0) / 0.5, "rebound_exponent": 1.0})
+    assert law.other_starts(Reach(0.0, 0.0)) == law.other_starts(Reach(np.inf, np.inf)) == []
